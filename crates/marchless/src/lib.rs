@@ -1,0 +1,27 @@
+//! Smooth voxel terrain from bit fields.
+#![no_std]
+
+extern crate alloc;
+
+mod brush;
+mod buffer;
+pub mod cases;
+mod cell;
+mod grid;
+mod lattice;
+mod mesher;
+mod query;
+mod sample;
+mod source;
+mod validate;
+
+pub use brush::*;
+pub use buffer::MeshBuffer;
+pub use cell::*;
+pub use grid::*;
+pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
+pub use mesher::*;
+pub use query::*;
+pub use sample::{Voxel, Weight};
+pub use source::*;
+pub use validate::*;

@@ -1,0 +1,233 @@
+//! What a lattice point holds: a [`Weight`], the signed distance to the surface, and a material.
+
+use core::fmt::Debug;
+
+/// The sample at one lattice point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Voxel<W = i16> {
+    /// Signed distance to the surface; negative is inside, zero and positive are outside.
+    pub weight: W,
+    /// The user's number for what the point is made of; it has no effect on the shape.
+    pub material: u8,
+}
+
+impl<W: Weight> Voxel<W> {
+    /// Air: as far outside as the weight can say, of material 0.
+    pub const AIR: Self = Self { weight: W::OUTSIDE, material: 0 };
+
+    /// A voxel of `weight` and `material`.
+    pub const fn new(weight: W, material: u8) -> Self {
+        Self { weight, material }
+    }
+}
+
+/// A signed distance in voxels: **negative inside, zero and positive outside**.
+///
+/// | type | one step | range |
+/// |---|---|---|
+/// | `i8` | 1/32 voxel | −4 to +3.97 voxels |
+/// | `i16` | 1/256 voxel | −128 to +127.996 voxels |
+/// | `f32` | – | any; NaN counts as outside, infinities by their sign |
+///
+/// The trait is sealed: the mesher's passes rely on what these three do.
+pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private::Sealed + 'static {
+    /// Steps per voxel: 32, 256 or 1.
+    const SCALE: f32;
+    /// The weight farthest outside (`MAX`).
+    const OUTSIDE: Self;
+    /// The weight farthest inside (`MIN`).
+    const INSIDE: Self;
+
+    /// The weight of a distance in voxels: saturated to the type's range and rounded to the nearest step, but
+    /// never across zero (a negative distance stays negative, however small). NaN becomes [`Weight::OUTSIDE`].
+    fn from_voxels(distance: f32) -> Self;
+
+    /// The distance in voxels; exact.
+    fn to_voxels(self) -> f32;
+}
+
+/// What the passes need of a weight, out of the users' reach.
+pub(crate) mod private {
+    pub trait Sealed: Sized + Copy {
+        /// The isovalue in this weight's own terms, so that [`Sealed::inside`] is one comparison.
+        type Threshold: Copy;
+        /// `isovalue`: in voxels, finite.
+        fn threshold(isovalue: f32) -> Self::Threshold;
+        /// Whether the sample lies below the isovalue.
+        fn inside(self, threshold: Self::Threshold) -> bool;
+        /// The sample for gradients: proportional to the distance, the same factor for all samples; may be infinite or NaN.
+        fn raw(self) -> f32;
+        /// How far along the edge from `a` to `b` the isovalue lies, before clamping; `a` and `b` lie on its two
+        /// sides. Finite. `isovalue`: in steps (voxels × `SCALE`).
+        fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
+        /// The sample as a finite number, for the rare gradients that overflow.
+        fn finite(self) -> f64;
+    }
+}
+
+macro_rules! integer_weight {
+    ($type:ty, $scale:literal) => {
+        impl Weight for $type {
+            const SCALE: f32 = $scale;
+            const OUTSIDE: Self = <$type>::MAX;
+            const INSIDE: Self = <$type>::MIN;
+
+            fn from_voxels(distance: f32) -> Self {
+                if distance.is_nan() {
+                    return Self::OUTSIDE;
+                }
+                let steps = distance * $scale;
+                // Casts truncate towards zero and saturate; half a step away from zero rounds to the nearest.
+                if steps < 0.0 {
+                    ((steps - 0.5) as $type).min(-1)
+                } else if distance < 0.0 {
+                    -1 // the product underflowed
+                } else {
+                    (steps + 0.5) as $type
+                }
+            }
+
+            fn to_voxels(self) -> f32 {
+                f32::from(self) / $scale
+            }
+        }
+
+        impl private::Sealed for $type {
+            type Threshold = i32;
+
+            fn threshold(isovalue: f32) -> i32 {
+                // w < iso over the integers is w < ⌈iso⌉; the cast saturates far beyond any weight.
+                let steps = isovalue * $scale;
+                let whole = steps as i32;
+                if steps > whole as f32 { whole.saturating_add(1) } else { whole }
+            }
+
+            #[inline(always)]
+            fn inside(self, threshold: i32) -> bool {
+                i32::from(self) < threshold
+            }
+
+            #[inline(always)]
+            fn raw(self) -> f32 {
+                f32::from(self)
+            }
+
+            #[inline(always)]
+            fn fraction(a: Self, b: Self, isovalue: f32) -> f32 {
+                let (a, b) = (f32::from(a), f32::from(b));
+                (isovalue - a) / (b - a)
+            }
+
+            fn finite(self) -> f64 {
+                f64::from(self)
+            }
+        }
+    };
+}
+
+integer_weight!(i8, 32.0);
+integer_weight!(i16, 256.0);
+
+impl Weight for f32 {
+    const SCALE: f32 = 1.0;
+    const OUTSIDE: Self = Self::MAX;
+    const INSIDE: Self = Self::MIN;
+
+    fn from_voxels(distance: f32) -> Self {
+        if distance.is_nan() { Self::OUTSIDE } else { distance }
+    }
+
+    fn to_voxels(self) -> f32 {
+        self
+    }
+}
+
+impl private::Sealed for f32 {
+    type Threshold = f32;
+
+    fn threshold(isovalue: f32) -> f32 {
+        isovalue
+    }
+
+    #[inline(always)]
+    fn inside(self, threshold: f32) -> bool {
+        self < threshold
+    }
+
+    #[inline(always)]
+    fn raw(self) -> f32 {
+        self
+    }
+
+    #[inline(always)]
+    fn fraction(a: Self, b: Self, isovalue: f32) -> f32 {
+        let difference = b - a;
+        // Outside this range the difference overflowed, lost its bits, or an end is not finite.
+        if (1e-30..1e30).contains(&difference.abs()) {
+            (isovalue - a) / difference
+        } else {
+            let (a, b) = (a.finite(), b.finite());
+            ((f64::from(isovalue) - a) / (b - a)) as f32
+        }
+    }
+
+    fn finite(self) -> f64 {
+        if self.is_nan() { f64::from(Self::MAX) } else { f64::from(self.clamp(Self::MIN, Self::MAX)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn keeps_sign<W: Weight>(distance: f32, zero: W) {
+        let weight = W::from_voxels(distance);
+        if distance.is_nan() {
+            assert_eq!(weight, W::OUTSIDE);
+        } else {
+            assert_eq!(weight < zero, distance < 0.0, "{distance} became {weight:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn conversions_keep_the_sign(distance in proptest::num::f32::ANY) {
+            keeps_sign::<i8>(distance, 0);
+            keeps_sign::<i16>(distance, 0);
+            keeps_sign::<f32>(distance, 0.0);
+        }
+
+        #[test]
+        fn conversions_round_to_the_nearest_step(distance in -127.9f32..127.9) {
+            let error = (i16::from_voxels(distance).to_voxels() - distance).abs();
+            let allowed = if distance < 0.0 && distance > -1.0 / 256.0 { 1.0 / 256.0 } else { 0.5 / 256.0 };
+            prop_assert!(error <= allowed, "{distance}: off by {error}");
+        }
+
+        #[test]
+        fn thresholds_compare_as_the_real_numbers_do(weight: i16, isovalue in -140.0f32..140.0) {
+            use private::Sealed as _;
+            let exact = f64::from(weight) / 256.0 < f64::from(isovalue);
+            prop_assert_eq!(weight.inside(i16::threshold(isovalue)), exact);
+        }
+
+        #[test]
+        fn fractions_lie_between_the_ends(a in proptest::num::f32::ANY, b in proptest::num::f32::ANY) {
+            use private::Sealed as _;
+            prop_assume!((a < 0.0) != (b < 0.0));
+            let fraction = f32::fraction(a, b, 0.0);
+            prop_assert!((0.0..=1.0).contains(&fraction), "{a} to {b}: {fraction}");
+        }
+    }
+
+    #[test]
+    fn every_integer_weight_survives_a_round_trip() {
+        for weight in i16::MIN..=i16::MAX {
+            assert_eq!(i16::from_voxels(weight.to_voxels()), weight);
+        }
+        for weight in i8::MIN..=i8::MAX {
+            assert_eq!(i8::from_voxels(weight.to_voxels()), weight);
+        }
+    }
+}
