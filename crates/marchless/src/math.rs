@@ -1,0 +1,20 @@
+//! The square root, which `core` lacks. It is exact in IEEE 754, so that both versions give the same bits.
+
+#[cfg(feature = "std")]
+extern crate std;
+
+#[inline(always)]
+pub(crate) fn sqrt(value: f32) -> f32 {
+    #[cfg(feature = "std")]
+    return value.sqrt();
+    #[cfg(not(feature = "std"))]
+    return libm::sqrtf(value);
+}
+
+#[inline(always)]
+pub(crate) fn sqrt_f64(value: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return value.sqrt();
+    #[cfg(not(feature = "std"))]
+    return libm::sqrt(value);
+}
