@@ -1,0 +1,1 @@
+//! Applying stamps to samples.

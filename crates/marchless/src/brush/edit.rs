@@ -1,0 +1,85 @@
+//! What a stamp did: [`Edit`].
+
+use alloc::collections::BTreeMap;
+
+use crate::lattice::Region;
+
+/// What applying a stamp changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Edit {
+    /// The smallest box around the changed samples; empty where none changed.
+    pub region: Region,
+    /// What became solid, by the material it has now.
+    pub added: VolumeByMaterial,
+    /// What became air, by the material it was.
+    pub removed: VolumeByMaterial,
+}
+
+impl Edit {
+    /// An edit that changed nothing.
+    pub const NONE: Self =
+        Self { region: Region::new([0; 3], [0; 3]), added: VolumeByMaterial::new(), removed: VolumeByMaterial::new() };
+
+    /// Whether no sample changed, neither its weight nor its material.
+    pub const fn is_empty(&self) -> bool {
+        self.region.is_empty()
+    }
+
+    /// Adds what another edit changed, of other samples or later.
+    pub fn merge(&mut self, other: &Self) {
+        self.region = self.region.union(&other.region);
+        self.added.merge(&other.added);
+        self.removed.merge(&other.removed);
+    }
+}
+
+impl Default for Edit {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+/// Volumes in cubic voxels, one a material: each sample counts as one cubic voxel of its own material.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VolumeByMaterial(BTreeMap<u8, u64>);
+
+impl VolumeByMaterial {
+    /// No volume of any material.
+    pub const fn new() -> Self {
+        Self(BTreeMap::new())
+    }
+
+    /// The volume of `material`.
+    pub fn get(&self, material: u8) -> u64 {
+        self.0.get(&material).copied().unwrap_or(0)
+    }
+
+    /// The volume of all materials.
+    pub fn total(&self) -> u64 {
+        self.0.values().sum()
+    }
+
+    /// Whether there is no volume of any material.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The materials that have a volume, in order, each with its volume.
+    pub fn iter(&self) -> impl Iterator<Item = (u8, u64)> + '_ {
+        self.0.iter().map(|(&material, &volume)| (material, volume))
+    }
+
+    /// Adds `volume` of `material`.
+    pub fn add(&mut self, material: u8, volume: u64) {
+        if volume > 0 {
+            *self.0.entry(material).or_default() += volume;
+        }
+    }
+
+    /// Adds all of `other`'s volumes.
+    pub fn merge(&mut self, other: &Self) {
+        for (material, volume) in other.iter() {
+            self.add(material, volume);
+        }
+    }
+}
