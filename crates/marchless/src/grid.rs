@@ -1,1 +1,311 @@
-//! TODO
+//! [`Grid`]: a sparse volume of chunks, each uniform or samples that are copied on write.
+
+mod block;
+pub(crate) mod border;
+mod chunk;
+#[cfg(test)]
+mod tests;
+
+use alloc::collections::{BTreeMap, BTreeSet};
+
+use thiserror::Error;
+
+pub use self::block::{Block, Neighbourhood};
+use self::border::Border;
+pub use self::chunk::{Chunk, ChunkSamples};
+use crate::lattice::Region;
+use crate::sample::{Voxel, Weight};
+
+/// Cells per axis of a chunk where nothing else is asked for.
+pub const DEFAULT_CHUNK_CELLS: u32 = 32;
+/// The fewest cells per axis that a chunk may have.
+pub const MIN_CHUNK_CELLS: u32 = 8;
+/// The most cells per axis that a chunk may have.
+pub const MAX_CHUNK_CELLS: u32 = 62;
+
+/// A sparse volume of samples in chunks of `n` cells per axis: the chunk at `c` owns the lattice points
+/// `c·n` to `c·n + n − 1` of each axis.
+///
+/// Cloning shares the samples, and either copy may be edited without affecting the other. The grid remembers which
+/// chunks' meshes an edit has changed, until [`Grid::take_dirty`].
+///
+/// A **bounded** grid has air around it, so that its chunks' meshes together are closed (for isovalues below half a
+/// voxel): every sample written is intersected with a box half a voxel inside the outermost planes.
+///
+/// ```
+/// use marchless::{Grid, Region, Voxel};
+///
+/// let mut grid = Grid::<i16>::bounded(32, Region::new([0; 3], [2, 1, 2]))?;
+/// grid.set([40, 10, 3], Voxel::new(-128, 1))?;
+/// assert_eq!(grid.get([40, 10, 3]), Voxel::new(-128, 1));
+/// assert_eq!(grid.get([40, 10, 4]), Voxel::AIR);
+/// # Ok::<(), marchless::GridError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Grid<W = i16> {
+    cells: u32,
+    bounds: Option<Region>,
+    chunks: BTreeMap<[i32; 3], Chunk<W>>,
+    dirty: BTreeSet<[i32; 3]>,
+}
+
+impl<W: Weight> Grid<W> {
+    /// An empty grid without bounds: absent chunks are air. `chunk_cells`: 8 to 62 per axis.
+    ///
+    /// # Errors
+    /// [`GridError::ChunkCells`].
+    pub fn new(chunk_cells: u32) -> Result<Self, GridError> {
+        check_cells(chunk_cells)?;
+        Ok(Self { cells: chunk_cells, bounds: None, chunks: BTreeMap::new(), dirty: BTreeSet::new() })
+    }
+
+    /// An empty grid of the chunks in `chunks`, with air around them.
+    ///
+    /// # Errors
+    /// [`GridError::ChunkCells`]; [`GridError::Bounds`] where `chunks` is empty or its lattice points do not fit in
+    /// `i32`.
+    pub fn bounded(chunk_cells: u32, chunks: Region) -> Result<Self, GridError> {
+        let grid = Self::new(chunk_cells)?;
+        let limits = grid.limits();
+        if chunks.is_empty() || chunks.intersection(&limits) != chunks {
+            return Err(GridError::Bounds { bounds: chunks, limits });
+        }
+        Ok(Self { bounds: Some(chunks), ..grid })
+    }
+
+    /// Cells per axis of a chunk.
+    pub const fn chunk_cells(&self) -> u32 {
+        self.cells
+    }
+
+    /// The chunk positions of a bounded grid.
+    pub const fn bounds(&self) -> Option<Region> {
+        self.bounds
+    }
+
+    /// The outermost lattice planes of a bounded grid: points at `min` and at `max` lie on them, both included.
+    pub fn planes(&self) -> Option<Region> {
+        let scaled = |v: i32| v * self.cells as i32; // fits: checked when the grid was made
+        self.bounds.map(|bounds| Region::new(bounds.min.map(scaled), bounds.max.map(scaled)))
+    }
+
+    /// The position of the chunk that owns `point`.
+    pub fn chunk_of(&self, point: [i32; 3]) -> [i32; 3] {
+        point.map(|v| v.div_euclid(self.cells as i32))
+    }
+
+    /// The lattice points that the chunk at `position` owns, saturating at the ends of `i32`.
+    pub fn chunk_region(&self, position: [i32; 3]) -> Region {
+        let min = position.map(|v| v.saturating_mul(self.cells as i32));
+        Region::new(min, min.map(|v| v.saturating_add(self.cells as i32)))
+    }
+
+    /// The sample at `point`. Absent chunks are air; beyond the bounds lies air that is half a voxel from the
+    /// surface on the outermost planes and one voxel more with each point farther out.
+    pub fn get(&self, point: [i32; 3]) -> Voxel<W> {
+        let position = self.chunk_of(point);
+        match (self.chunks.get(&position), self.border()) {
+            (Some(chunk), _) => chunk.voxel(self.index(point)),
+            (None, Some(border)) if !self.limits().contains(position) => border.beyond(point.map(i64::from)),
+            (None, _) => Voxel::AIR,
+        }
+    }
+
+    /// Changes the sample at `point` and marks the chunks dirty whose meshes read it.
+    ///
+    /// # Errors
+    /// [`GridError::OutOfBounds`]; nothing is changed then.
+    pub fn set(&mut self, point: [i32; 3], voxel: Voxel<W>) -> Result<(), GridError> {
+        let (cells, index, border) = (self.cells, self.index(point), self.border());
+        let weight = border.map_or(voxel.weight, |border| border.clip(point, voxel.weight));
+        let voxel = Voxel { weight, ..voxel };
+        let chunk = self.chunk_mut(self.chunk_of(point))?;
+        if chunk.voxel(index) != voxel {
+            let samples = chunk.samples_mut(cells);
+            samples.weights[index] = voxel.weight;
+            samples.materials[index] = voxel.material;
+            self.mark_dirty(Region::new(point, point).grown(0, 1));
+        }
+        Ok(())
+    }
+
+    /// Puts a whole chunk at `position`, clipped to the border, and marks it and its neighbours dirty.
+    ///
+    /// # Errors
+    /// [`GridError::OutOfBounds`], and [`GridError::SamplesLength`] where the chunk is of another size; nothing is
+    /// changed then.
+    pub fn insert(&mut self, position: [i32; 3], mut chunk: Chunk<W>) -> Result<(), GridError> {
+        chunk.check(self.cells)?;
+        self.check(position)?;
+        let region = self.chunk_region(position);
+        if let Some(border) = self.border() {
+            chunk.clip(region.min, self.cells, &border);
+        }
+        self.chunks.insert(position, chunk);
+        self.mark_dirty(region);
+        Ok(())
+    }
+
+    /// The chunk at `position`, where there is one.
+    pub fn chunk(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
+        self.chunks.get(&position)
+    }
+
+    /// All chunks, in order of position.
+    pub fn chunks(&self) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+        self.chunks.iter().map(|(position, chunk)| (*position, chunk))
+    }
+
+    /// Takes the chunk at `position` out, so that it reads as air, and marks it and its neighbours dirty.
+    pub fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
+        let chunk = self.chunks.remove(&position)?;
+        self.mark_dirty(self.chunk_region(position));
+        Some(chunk)
+    }
+
+    /// The chunk at `position` with its neighbours, as they are now: what a task needs to mesh it.
+    pub fn neighbourhood(&self, position: [i32; 3]) -> Neighbourhood<W> {
+        let chunks = core::array::from_fn(|index| {
+            let step = [index % 3, index / 3 % 3, index / 9];
+            let mut neighbour = [0; 3];
+            for axis in 0..3 {
+                neighbour[axis] = position[axis].checked_add(step[axis] as i32 - 1)?;
+            }
+            match self.chunks.get(&neighbour) {
+                Some(chunk) => Some(chunk.clone()),
+                None => self.limits().contains(neighbour).then_some(Chunk::AIR),
+            }
+        });
+        let origin = position.map(|v| i64::from(v) * i64::from(self.cells));
+        Neighbourhood { chunks, cells: self.cells, origin, border: self.border() }
+    }
+
+    /// The chunk positions whose block (one point below, two above) reads a point of `changed`, within the bounds.
+    pub fn chunks_affected_by(&self, changed: Region) -> Region {
+        if changed.is_empty() {
+            return Region::new([0; 3], [0; 3]);
+        }
+        let n = i64::from(self.cells);
+        // n·c − 1 < changed.max and n·c + n + 1 ≥ changed.min; the quotients fit.
+        let affected = Region {
+            min: changed.min.map(|v| (i64::from(v) - 2).div_euclid(n) as i32),
+            max: changed.max.map(|v| i64::from(v).div_euclid(n) as i32 + 1),
+        };
+        affected.intersection(&self.limits())
+    }
+
+    /// Marks the chunks dirty whose meshes read a point of `changed`. Absent chunks without a present neighbour have
+    /// no mesh, and may be left out where there are many.
+    pub fn mark_dirty(&mut self, changed: Region) {
+        let affected = self.chunks_affected_by(changed);
+        if affected.is_empty() {
+            return;
+        }
+        let count = affected.size().into_iter().map(u128::from).product::<u128>();
+        if count <= 27 * (self.chunks.len() as u128 + 1) {
+            self.dirty.extend(affected.points());
+            return;
+        }
+        for &position in self.chunks.keys() {
+            let around = Region::new(position, position).grown(1, 2);
+            self.dirty.extend(around.intersection(&affected).points());
+        }
+    }
+
+    /// The chunks whose meshes are out of date.
+    pub const fn dirty(&self) -> &BTreeSet<[i32; 3]> {
+        &self.dirty
+    }
+
+    /// The chunks whose meshes are out of date; from now on, none are.
+    pub fn take_dirty(&mut self) -> BTreeSet<[i32; 3]> {
+        core::mem::take(&mut self.dirty)
+    }
+
+    /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who clips it to the
+    /// border and marks what has changed.
+    pub(crate) fn chunk_mut(&mut self, position: [i32; 3]) -> Result<&mut Chunk<W>, GridError> {
+        self.check(position)?;
+        Ok(self.chunks.entry(position).or_insert(Chunk::AIR))
+    }
+
+    /// The border of a bounded grid, that all samples written are clipped to.
+    pub(crate) fn border(&self) -> Option<Border> {
+        self.planes().map(Border::new)
+    }
+
+    /// The index of `point` among the samples of its chunk.
+    pub(crate) fn index(&self, point: [i32; 3]) -> usize {
+        let n = self.cells as i32;
+        let [x, y, z] = point.map(|v| v.rem_euclid(n) as usize);
+        x + n as usize * (y + n as usize * z)
+    }
+
+    /// # Errors
+    /// [`GridError::OutOfBounds`] where there is no place for a chunk at `position`.
+    pub(crate) fn check(&self, position: [i32; 3]) -> Result<(), GridError> {
+        let bounds = self.limits();
+        if bounds.contains(position) { Ok(()) } else { Err(GridError::OutOfBounds { position, bounds }) }
+    }
+
+    /// The chunk positions that may be present: the bounds, or all whose blocks fit in `i32`.
+    fn limits(&self) -> Region {
+        self.bounds.unwrap_or_else(|| {
+            let end = (i32::MAX - 2) / self.cells as i32;
+            Region::new([-end; 3], [end; 3])
+        })
+    }
+}
+
+fn check_cells(cells: u32) -> Result<(), GridError> {
+    if (MIN_CHUNK_CELLS..=MAX_CHUNK_CELLS).contains(&cells) {
+        Ok(())
+    } else {
+        Err(GridError::ChunkCells { found: cells })
+    }
+}
+
+/// Why a grid or a chunk was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum GridError {
+    /// Chunks cannot have this size.
+    #[error("a chunk has {MIN_CHUNK_CELLS} to {MAX_CHUNK_CELLS} cells per axis, not {found}")]
+    ChunkCells {
+        /// What was given.
+        found: u32,
+    },
+    /// A grid cannot have these bounds.
+    #[error(
+        "a grid's bounds hold at least one chunk and lie within {:?} to {:?}, but {:?} to {:?} was asked for",
+        limits.min, limits.max, bounds.min, bounds.max
+    )]
+    Bounds {
+        /// What was given, in chunks.
+        bounds: Region,
+        /// What can be addressed, in chunks.
+        limits: Region,
+    },
+    /// There is no place for a chunk.
+    #[error("chunk {position:?} lies outside of the grid's chunks, {:?} up to, but without, {:?}", bounds.min, bounds.max)]
+    OutOfBounds {
+        /// The chunk's position.
+        position: [i32; 3],
+        /// The grid's bounds, or what can be addressed, in chunks.
+        bounds: Region,
+    },
+    /// The samples are not those of a chunk.
+    #[error(
+        "a chunk of {cells} cells per axis has {expected} samples, but there are {weights} weights and {materials} materials"
+    )]
+    SamplesLength {
+        /// Cells per axis.
+        cells: u32,
+        /// How many samples that makes.
+        expected: usize,
+        /// How many weights there are.
+        weights: usize,
+        /// How many materials there are.
+        materials: usize,
+    },
+}

@@ -1,1 +1,184 @@
-//! TODO
+//! [`Source`]: what a terrain is before anyone edits it, sampled box by box.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+
+use crate::lattice::{Shape, ShapeError};
+
+/// The box of lattice points that a [`Source`] is asked about.
+///
+/// Positions are integers, and only [`SourceRegion::position`] turns them into world units, in `f64`: nothing is
+/// lost far from the origin, and the same point has the same position whichever region it is asked through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SourceRegion {
+    /// The lowest point, in lattice positions of this level.
+    pub min: [i32; 3],
+    /// Points per axis.
+    pub size: [u32; 3],
+    /// The level of detail: 0 is the finest, and each further one doubles the spacing.
+    pub level: u8,
+    /// World units between neighbouring points of this level.
+    pub spacing: f64,
+}
+
+impl SourceRegion {
+    /// The world position (terrain space) of the point `index`, counted from the lowest one.
+    pub fn position(&self, index: [u32; 3]) -> [f64; 3] {
+        core::array::from_fn(|axis| (f64::from(self.min[axis]) + f64::from(index[axis])) * self.spacing)
+    }
+
+    /// The number of points; saturates where it cannot be addressed.
+    pub const fn len(&self) -> usize {
+        let [x, y, z] = self.size;
+        (x as usize).saturating_mul(y as usize).saturating_mul(z as usize)
+    }
+
+    /// Whether there is no point.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The shape of the slices that are to be filled.
+    ///
+    /// # Errors
+    /// As [`Shape::new`]; never for the regions that this crate passes to a [`Source`].
+    pub const fn shape(&self) -> Result<Shape, ShapeError> {
+        Shape::new(self.size)
+    }
+
+    /// The region grown by `points` on all sides, saturating at the ends of the lattice.
+    #[must_use]
+    pub fn grown(&self, points: u32) -> Self {
+        Self {
+            min: self.min.map(|v| v.saturating_sub_unsigned(points)),
+            size: self.size.map(|v| v.saturating_add(points.saturating_mul(2))),
+            ..*self
+        }
+    }
+}
+
+/// What a [`Source`] knows about a whole region without sampling it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// All points lie inside and are of one material.
+    Inside {
+        /// The material of them all.
+        material: u8,
+    },
+    /// All points lie outside.
+    Outside,
+    /// Neither is certain.
+    Mixed,
+}
+
+/// A field of signed distances and materials: negative inside, zero and positive outside.
+///
+/// The distance need only be right in sign and roughly right in size near the surface; a field that grows by about
+/// one voxel a voxel there gives the best normals and the most even brush strokes. Sources are called from any
+/// thread, for one point as often as for many, and must answer the same each time.
+///
+/// Every closure from a world position to a world distance is a source:
+///
+/// ```
+/// use marchless::Source;
+///
+/// let ball = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - 10.0;
+/// let source: Box<dyn Source> = Box::new(ball);
+/// ```
+pub trait Source: Send + Sync + 'static {
+    /// Samples every point of `region`.
+    ///
+    /// `distances`: `[nx·ny·nz]`, x fastest, to be filled with distances in voxels of this level (world distance
+    /// divided by [`SourceRegion::spacing`]); NaN counts as outside. `materials`: the same shape, all 0 when called.
+    fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]);
+
+    /// What is certain about all points of `region`. Anything but [`Bound::Mixed`] spares sampling them, so an
+    /// answer that costs less than a few samples pays; a wrong one leaves holes.
+    fn bound(&self, region: &SourceRegion) -> Bound {
+        let _ = region;
+        Bound::Mixed
+    }
+}
+
+/// World position (terrain space) to signed distance in world units; material 0.
+impl<F: Fn([f64; 3]) -> f64 + Send + Sync + 'static> Source for F {
+    fn fill(&self, region: &SourceRegion, distances: &mut [f32], _materials: &mut [u8]) {
+        let [nx, ny, nz] = region.size;
+        let mut distances = distances.iter_mut();
+        for z in 0..nz {
+            for y in 0..ny {
+                for (x, distance) in (0..nx).zip(&mut distances) {
+                    *distance = (self(region.position([x, y, z])) / region.spacing) as f32;
+                }
+            }
+        }
+    }
+}
+
+macro_rules! forward {
+    ($pointer:ty) => {
+        impl Source for $pointer {
+            fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+                (**self).fill(region, distances, materials);
+            }
+
+            fn bound(&self, region: &SourceRegion) -> Bound {
+                (**self).bound(region)
+            }
+        }
+    };
+}
+
+forward!(Box<dyn Source>);
+forward!(Arc<dyn Source>);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec;
+
+    const REGION: SourceRegion = SourceRegion { min: [-2, 5, 0], size: [3, 2, 4], level: 1, spacing: 0.5 };
+
+    #[test]
+    fn closures_are_asked_in_world_units_and_answer_in_voxels() {
+        let source = |[x, y, z]: [f64; 3]| x + 10.0 * y + 100.0 * z;
+        let mut distances = vec![0.0; REGION.len()];
+        let mut materials = vec![0; REGION.len()];
+        source.fill(&REGION, &mut distances, &mut materials);
+        let shape = REGION.shape().unwrap();
+        for (x, y, z) in [(0, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 3)] {
+            let expected = f64::from(x) - 2.0 + 10.0 * (f64::from(y) + 5.0) + 100.0 * f64::from(z);
+            assert_eq!(distances[shape.index([x, y, z])], expected as f32);
+        }
+    }
+
+    #[test]
+    fn pointers_forward_the_bound_too() {
+        struct Rock;
+        impl Source for Rock {
+            fn fill(&self, _: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+                distances.fill(-1.0);
+                materials.fill(7);
+            }
+            fn bound(&self, _: &SourceRegion) -> Bound {
+                Bound::Inside { material: 7 }
+            }
+        }
+        let boxed: Box<dyn Source> = Box::new(Rock);
+        let shared: Arc<dyn Source> = Arc::new(boxed);
+        assert_eq!(shared.bound(&REGION), Bound::Inside { material: 7 });
+        let (mut distances, mut materials) = ([0.0; 2], [0; 2]);
+        shared.fill(&REGION, &mut distances, &mut materials);
+        assert_eq!((distances, materials), ([-1.0; 2], [7; 2]));
+    }
+
+    #[test]
+    fn regions_grow_and_saturate() {
+        let grown = REGION.grown(2);
+        assert_eq!((grown.min, grown.size), ([-4, 3, -2], [7, 6, 8]));
+        let end = SourceRegion { min: [i32::MIN; 3], size: [u32::MAX; 3], ..REGION };
+        assert_eq!(end.grown(u32::MAX).size, [u32::MAX; 3]);
+        assert!(end.shape().is_err());
+        assert!(SourceRegion { size: [4, 0, 4], ..REGION }.is_empty());
+    }
+}

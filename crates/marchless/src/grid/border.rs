@@ -1,0 +1,92 @@
+//! The border of a bounded grid: a box half a voxel inside its outermost planes, with which every sample written
+//! is intersected, so that the surface is closed and its walls are flat.
+//!
+//! A sample `k` points inside of the nearest plane (0 on it, negative beyond it) weighs at least `0.5 − k` voxels.
+//! That is exact in every weight's steps, and a maximum: clipping twice, or layer by layer, changes nothing.
+
+use crate::lattice::Region;
+use crate::sample::{Voxel, Weight};
+
+/// Only the samples up to so many points inside of a plane are clipped: deeper ones are out of the surface's reach.
+const DEPTH: i64 = 4;
+
+/// The box of lattice points of a bounded grid: its planes are points at `min` and at `max`, both included.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Border {
+    min: [i64; 3],
+    max: [i64; 3],
+}
+
+impl Border {
+    /// `planes`: [`crate::Grid::planes`].
+    pub(crate) fn new(planes: Region) -> Self {
+        Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from) }
+    }
+
+    /// What is read at a point that no chunk of the grid owns.
+    pub(super) fn beyond<W: Weight>(&self, point: [i64; 3]) -> Voxel<W> {
+        Voxel::new(wall(self.depth(point)), 0)
+    }
+
+    /// `weight`, intersected with the box at `point`.
+    pub(crate) fn clip<W: Weight>(&self, point: [i32; 3], weight: W) -> W {
+        let depth = self.depth(point.map(i64::from));
+        if depth > DEPTH { weight } else { larger(weight, wall(depth)) }
+    }
+
+    /// Every layer of a chunk that is clipped: its axis, its index along that axis, and the least weight in it.
+    ///
+    /// `origin`: the chunk's lowest lattice point.
+    pub(super) fn layers<W: Weight>(&self, origin: [i32; 3], cells: u32) -> impl Iterator<Item = (usize, u32, W)> {
+        let border = *self;
+        (0..3).flat_map(move |axis| {
+            (0..cells).filter_map(move |index| {
+                let depth = border.depth_along(axis, i64::from(origin[axis]) + i64::from(index));
+                (depth <= DEPTH).then(|| (axis, index, wall(depth)))
+            })
+        })
+    }
+
+    /// How many points inside of the nearest plane `point` lies.
+    fn depth(&self, point: [i64; 3]) -> i64 {
+        (0..3).map(|axis| self.depth_along(axis, point[axis])).fold(i64::MAX, i64::min)
+    }
+
+    fn depth_along(&self, axis: usize, coordinate: i64) -> i64 {
+        (coordinate - self.min[axis]).min(self.max[axis] - coordinate)
+    }
+}
+
+/// The weight of the box itself, `depth` points inside of its nearest plane.
+fn wall<W: Weight>(depth: i64) -> W {
+    W::from_voxels(0.5 - depth as f32)
+}
+
+/// The maximum; NaN, which counts as outside, stays.
+fn larger<W: Weight>(a: W, b: W) -> W {
+    if a < b { b } else { a }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walls_are_exact_in_steps() {
+        for depth in 0..=DEPTH {
+            assert_eq!(i64::from(wall::<i16>(depth)), 128 - 256 * depth);
+            assert_eq!(i64::from(wall::<i8>(depth)), 16 - 32 * depth);
+        }
+        assert_eq!(wall::<i8>(-1), 48);
+        assert_eq!(wall::<i8>(i64::MIN / 2), i8::MAX);
+    }
+
+    #[test]
+    fn clipping_reaches_four_points_deep() {
+        let border = Border::new(Region::new([0; 3], [16; 3]));
+        let clipped = |x| border.clip([x, 8, 8], i16::MIN);
+        assert_eq!([clipped(0), clipped(1), clipped(4), clipped(5)], [128, -128, 128 - 4 * 256, i16::MIN]);
+        assert_eq!([clipped(16), clipped(15), clipped(11)], [128, -128, i16::MIN]);
+        assert_eq!(border.clip([3, 15, 8], 500i16), 500);
+    }
+}
