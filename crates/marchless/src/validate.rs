@@ -458,7 +458,7 @@ mod tests {
             out_of_range_indices: 2,
             stray_indices: 2,
             components: 1,
-            euler: 3 - 3 + 2,
+            euler: 2,
             ..MeshReport::default()
         };
         assert_eq!(report, expected);
