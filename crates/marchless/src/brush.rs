@@ -18,6 +18,7 @@
 //! ```
 
 mod apply;
+mod change;
 mod edit;
 mod shape;
 

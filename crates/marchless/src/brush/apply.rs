@@ -1,1 +1,174 @@
-//! Applying stamps to samples.
+//! Applying stamps to chunks and grids.
+
+use super::{EDIT_LIMIT, Edit, Stamp, change::Change};
+use crate::{
+    grid::{Chunk, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, border::Border},
+    lattice::Region,
+    sample::Voxel,
+};
+
+impl Grid<i16> {
+    /// Applies `stamp` to all the chunks it touches, absent ones (air) included, and marks dirty what has changed. In a
+    /// bounded grid nothing changes outside the bounds, and the border stays air.
+    pub fn apply(&mut self, stamp: &Stamp) -> Edit {
+        let mut edit = Edit::NONE;
+        let touched = stamp.region();
+        if touched.is_empty() {
+            return edit;
+        }
+        let last = touched.max.map(|v| v - 1);
+        let chunks = Region::new(self.chunk_of(touched.min), self.chunk_of(last).map(|v| v + 1));
+        for position in self.bounds().map_or(chunks, |bounds| bounds.intersection(&chunks)).points() {
+            edit.merge(&self.apply_to_chunk(position, stamp));
+        }
+        edit
+    }
+
+    /// Applies `stamp` to the samples of one chunk only, and marks dirty what has changed. Nothing changes where there is
+    /// no place for a chunk.
+    ///
+    /// Applied to every chunk, each in its own time but with the stamps in the same order, it gives the same samples as
+    /// [`Grid::apply`].
+    pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &Stamp) -> Edit {
+        let edit = self.change_chunk(position, stamp).unwrap_or_default();
+        self.mark_dirty(edit.region);
+        edit
+    }
+
+    fn change_chunk(&mut self, position: [i32; 3], stamp: &Stamp) -> Result<Edit, GridError> {
+        let (cells, planes, origin) = (self.chunk_cells(), self.planes(), self.chunk_region(position).min);
+        self.check(position)?;
+        if self.chunk(position).is_some() {
+            return Ok(self.chunk_mut(position)?.apply_stamp(origin, cells, planes, stamp));
+        }
+        let mut chunk = Chunk::AIR;
+        let edit = chunk.apply_stamp(origin, cells, planes, stamp);
+        if !edit.is_empty() {
+            *self.chunk_mut(position)? = chunk;
+        }
+        Ok(edit)
+    }
+}
+
+impl Chunk<i16> {
+    /// Applies `stamp` to the samples of the chunk. A uniform chunk stays uniform where all of it changes alike, and
+    /// samples are written out or copied only where some of them change.
+    ///
+    /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes of
+    /// a bounded grid ([`Grid::planes`]), whose border stays closed. Nothing changes
+    /// in a chunk whose samples are not `cells³`, or where no chunk has so many.
+    pub fn apply_stamp(&mut self, origin: [i32; 3], cells: u32, planes: Option<Region>, stamp: &Stamp) -> Edit {
+        let chunk = Region::new(origin, origin.map(|v| v.saturating_add_unsigned(cells)));
+        let area = chunk.intersection(&stamp.region());
+        let cells_fit = (MIN_CHUNK_CELLS..=MAX_CHUNK_CELLS).contains(&cells) && self.check(cells).is_ok();
+        if area.is_empty() || !cells_fit {
+            return Edit::NONE;
+        }
+        let pass = Pass::new(stamp, origin, cells, planes, area);
+        if let Self::Uniform(old) = *self
+            && let Some(new) = pass.change_of_all(old)
+            && (new == old || area == chunk)
+        {
+            *self = Self::Uniform(new);
+            let mut edit = Edit::NONE;
+            if new != old {
+                edit.region = area;
+                count(&mut edit, old, new, area.size().into_iter().map(u64::from).product());
+            }
+            return edit;
+        }
+        pass.run(self)
+    }
+}
+
+/// One stamp on its way over one chunk.
+struct Pass {
+    change: Change,
+    /// The chunk's lowest lattice point.
+    origin: [i32; 3],
+    /// Its points per axis.
+    cells: u32,
+    /// Those of its points that the stamp may change; not empty.
+    area: Region,
+    /// The border of a bounded grid, where it keeps some weights of the area up.
+    border: Option<Border>,
+}
+
+impl Pass {
+    fn new(stamp: &Stamp, origin: [i32; 3], cells: u32, planes: Option<Region>, area: Region) -> Self {
+        // The points nearest to the border are those at two corners.
+        let ends = [area.min, area.max.map(|v| v - 1)];
+        let border = planes.map(Border::new);
+        let border = border.filter(|border| ends.iter().any(|&end| border.clip(end, -EDIT_LIMIT) > -EDIT_LIMIT));
+        Self { change: Change::new(stamp), origin, cells, area, border }
+    }
+
+    /// What becomes of the area's samples where all are `old`, if a glance shows that it is the same for all.
+    fn change_of_all(&self, old: Voxel<i16>) -> Option<Voxel<i16>> {
+        if self.change.leaves(old, -EDIT_LIMIT) {
+            return Some(old);
+        }
+        let distance = self.change.distance_over(&self.area)?;
+        self.border.is_none().then(|| self.change.at_distance(old, distance, -EDIT_LIMIT))
+    }
+
+    /// Applies the change sample by sample.
+    fn run(&self, chunk: &mut Chunk<i16>) -> Edit {
+        let mut edit = Edit::NONE;
+        let xs = self.area.min[0]..self.area.max[0];
+        let [_, ny, nz] = self.area.size();
+        let first_changed = (0..ny * nz).find(|&row| {
+            let ([y, z], start) = self.row(row);
+            xs.clone().zip(start..).any(|(x, index)| {
+                let old = chunk.voxel(index);
+                self.at(old, [x, y, z]) != old
+            })
+        });
+        let Some(first_changed) = first_changed else { return edit };
+        let samples = chunk.samples_mut(self.cells);
+        for row in first_changed..ny * nz {
+            let ([y, z], start) = self.row(row);
+            let mut changed = None;
+            for (x, index) in xs.clone().zip(start..) {
+                let old = Voxel::new(samples.weights[index], samples.materials[index]);
+                let new = self.at(old, [x, y, z]);
+                if new != old {
+                    samples.weights[index] = new.weight;
+                    samples.materials[index] = new.material;
+                    changed = Some((changed.map_or(x, |(first, _)| first), x));
+                    count(&mut edit, old, new, 1);
+                }
+            }
+            if let Some((first, last)) = changed {
+                edit.region = edit.region.union(&Region::new([first, y, z], [last + 1, y + 1, z + 1]));
+            }
+        }
+        edit
+    }
+
+    /// Of the area's row of this number, y and z, and the index of the first sample.
+    fn row(&self, row: u32) -> ([i32; 2], usize) {
+        let rows = self.area.size()[1];
+        let [y, z] = [self.area.min[1] + (row % rows) as i32, self.area.min[2] + (row / rows) as i32];
+        let [x, dy, dz] =
+            [self.area.min[0] - self.origin[0], y - self.origin[1], z - self.origin[2]].map(|v| v as usize);
+        let cells = self.cells as usize;
+        ([y, z], x + cells * (dy + cells * dz))
+    }
+
+    /// What becomes of `old` at `point`.
+    #[inline]
+    fn at(&self, old: Voxel<i16>, point: [i32; 3]) -> Voxel<i16> {
+        let floor = self.border.as_ref().map_or(-EDIT_LIMIT, |border| border.clip(point, -EDIT_LIMIT));
+        self.change.at_point(old, point, floor)
+    }
+}
+
+/// Counts `samples` that changed alike.
+fn count(edit: &mut Edit, old: Voxel<i16>, new: Voxel<i16>, samples: u64) {
+    match (old.weight < 0, new.weight < 0) {
+        (false, true) => edit.added.add(new.material, samples),
+        (true, false) => edit.removed.add(old.material, samples),
+        _ => {}
+    }
+}

@@ -119,7 +119,7 @@ impl<W: Weight> Chunk<W> {
 
     /// # Errors
     /// [`GridError::SamplesLength`] where the samples are not those of a chunk of `cells` cells per axis.
-    pub(super) fn check(&self, cells: u32) -> Result<(), GridError> {
+    pub(crate) fn check(&self, cells: u32) -> Result<(), GridError> {
         match self {
             Self::Uniform(_) => Ok(()),
             Self::Samples(samples) => check_lengths(&samples.weights, &samples.materials, cells),

@@ -1,0 +1,102 @@
+//! [`Change`]: what a stamp does to one sample.
+
+use super::{BrushShape, EDIT_LIMIT, Operation, Stamp, Stroke, shape::UNITS};
+use crate::{lattice::Region, sample::Voxel};
+
+/// A stamp made ready to be applied sample by sample.
+#[derive(Clone, Copy)]
+pub(super) struct Change {
+    /// Limited.
+    shape: BrushShape,
+    operation: Operation,
+    material: u8,
+    stroke: Option<Stroke>,
+    /// The range of distances within which they make a difference.
+    low: i32,
+    high: i32,
+}
+
+impl Change {
+    pub(super) fn new(stamp: &Stamp) -> Self {
+        let Stamp { operation, material, stroke, .. } = *stamp;
+        let limit = i32::from(EDIT_LIMIT);
+        let (low, high) = match (operation, &stroke) {
+            (Operation::Paint, _) => (-1, 0),
+            (_, Some(stroke)) => (-rim(stroke), 0),
+            (_, None) => (-limit, limit),
+        };
+        Self { shape: stamp.shape.limited(), operation, material, stroke, low, high }
+    }
+
+    /// What becomes of `old` at `point`. `floor`: the least weight that an edit may leave there, not below
+    /// −[`EDIT_LIMIT`].
+    #[inline]
+    pub(super) fn at_point(&self, old: Voxel<i16>, point: [i32; 3], floor: i16) -> Voxel<i16> {
+        if self.leaves(old, floor) {
+            return old;
+        }
+        self.at_distance(old, self.shape.distance_within(point, self.low, self.high), floor)
+    }
+
+    /// Whether `old` stays as it is at any distance.
+    #[inline]
+    pub(super) fn leaves(&self, old: Voxel<i16>, floor: i16) -> bool {
+        match self.operation {
+            Operation::Add => old.weight <= floor,
+            Operation::Dig => old.weight >= EDIT_LIMIT,
+            Operation::Paint => old.weight >= 0 || old.material == self.material,
+        }
+    }
+
+    /// What becomes of `old` at a `distance` from the shape, clamped to the range of this change.
+    #[inline]
+    pub(super) fn at_distance(&self, old: Voxel<i16>, distance: i32, floor: i16) -> Voxel<i16> {
+        let clamp = |weight: i32| weight.clamp(floor.into(), EDIT_LIMIT.into());
+        let now = clamp(old.weight.into());
+        let (new, material) = match (self.operation, &self.stroke) {
+            (Operation::Paint, _) if distance < 0 && old.weight < 0 => return Voxel::new(old.weight, self.material),
+            (Operation::Paint, _) => return old,
+            (Operation::Add, None) => (clamp(distance).min(now), self.material),
+            (Operation::Add, Some(stroke)) => (clamp(now - moved(stroke, distance)), self.material),
+            (Operation::Dig, None) => (clamp(-distance).max(now), old.material),
+            (Operation::Dig, Some(stroke)) => (clamp(now + moved(stroke, distance)), old.material),
+        };
+        if new == now {
+            return old;
+        }
+        let becomes_solid = old.weight >= 0 && new < 0;
+        Voxel::new(new as i16, if becomes_solid { material } else { old.material })
+    }
+
+    /// The clamped distance of all points of `area`, where a glance shows that it is one and the same.
+    pub(super) fn distance_over(&self, area: &Region) -> Option<i32> {
+        let size = area.size();
+        let middle = [0, 1, 2].map(|axis| area.min[axis].saturating_add_unsigned(size[axis] / 2));
+        // Distances differ by no more than points are apart, and a step for rounding.
+        let half = size.map(|size| u64::from(size.div_ceil(2) * UNITS));
+        let reach = half.iter().map(|half| half.pow(2)).sum::<u64>().isqrt() as i32 + 2;
+        let distance = self.shape.distance(middle);
+        if distance.saturating_add(reach) <= self.low {
+            Some(self.low)
+        } else if distance - reach >= self.high {
+            Some(self.high)
+        } else {
+            None
+        }
+    }
+}
+
+/// How deep inside the shape a stroke's full rate begins; never 0.
+fn rim(stroke: &Stroke) -> i32 {
+    stroke.falloff.clamp(1, i32::MAX as u32) as i32
+}
+
+/// How far a weight moves in a stroke's time, at a distance from minus the rim to 0. Moves of twice [`EDIT_LIMIT`]
+/// are as good as longer ones.
+fn moved(stroke: &Stroke, distance: i32) -> i32 {
+    let rate = u128::from(stroke.rate) * u128::from(distance.unsigned_abs());
+    let second = u128::from(rim(stroke).unsigned_abs()) * 1_000_000;
+    // Less than 2³² · 2³¹ · 2⁶⁴.
+    let until = |time: u64| rate * u128::from(time) / second;
+    until(stroke.end_us).saturating_sub(until(stroke.start_us)).min(2 * EDIT_LIMIT as u128) as i32
+}
