@@ -112,7 +112,7 @@ impl Mesher {
         if u32::try_from(vertex_count).is_err() {
             return Err(MeshError::TooManyVertices { found: vertex_count });
         }
-        vertices::place(&samples, &layout, settings, &self.signs, vertex_count as usize, out);
+        vertices::place(&samples, &layout, settings, &self.signs, &self.rows, vertex_count as usize, out);
         triangles::join(&layout, &self.signs, &self.rows, &mut out.indices);
         Ok(())
     }
@@ -200,10 +200,11 @@ fn shifted(words: &[u64], word: usize) -> u64 {
 #[inline(always)]
 fn set_bits(mut word: u64) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
-        (word != 0).then(|| {
-            let bit = word.trailing_zeros() as usize;
-            word &= word - 1;
-            bit
-        })
+        if word == 0 {
+            return None;
+        }
+        let bit = word.trailing_zeros() as usize;
+        word &= word - 1;
+        Some(bit)
     })
 }

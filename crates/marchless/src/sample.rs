@@ -93,18 +93,21 @@ macro_rules! integer_weight {
         }
 
         impl private::Sealed for $type {
-            type Threshold = i32;
+            /// The smallest weight that is outside, and whether there is none.
+            type Threshold = ($type, bool);
 
-            fn threshold(isovalue: f32) -> i32 {
-                // w < iso over the integers is w < ⌈iso⌉; the cast saturates far beyond any weight.
+            fn threshold(isovalue: f32) -> Self::Threshold {
+                // w < iso over the integers is w < ⌈iso⌉; the casts saturate.
                 let steps = isovalue * $scale;
                 let whole = steps as i32;
-                if steps > whole as f32 { whole.saturating_add(1) } else { whole }
+                let ceiling = if steps > whole as f32 { whole.saturating_add(1) } else { whole };
+                let within = ceiling.clamp(i32::from(<$type>::MIN), i32::from(<$type>::MAX));
+                (within as $type, ceiling > within)
             }
 
             #[inline(always)]
-            fn inside(self, threshold: i32) -> bool {
-                i32::from(self) < threshold
+            fn inside(self, (threshold, all): Self::Threshold) -> bool {
+                (self < threshold) | all
             }
 
             #[inline(always)]

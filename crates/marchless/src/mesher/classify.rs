@@ -24,18 +24,17 @@ pub(super) fn classify<W: Weight>(
 
 /// The signs of up to 64 samples.
 ///
-/// Eight samples become the eight bytes of a word first, which the compiler turns into vector compares; one multiplication then gathers their
-/// lowest bits.
+/// Each becomes a byte first, in a loop that the compiler turns into vector compares; one multiplication then
+/// gathers the lowest bits of eight bytes.
 #[inline(always)]
 fn sign_word<W: Weight>(weights: &[W], threshold: W::Threshold) -> u64 {
-    let (eights, rest) = weights.as_chunks::<8>();
-    let mut word = 0;
-    for (index, eight) in eights.iter().enumerate() {
-        let bytes = u64::from_le_bytes(eight.map(|weight| u8::from(weight.inside(threshold))));
-        word |= (bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * index);
+    let mut bytes = [0u8; 64];
+    for (byte, weight) in bytes.iter_mut().zip(weights) {
+        *byte = u8::from(weight.inside(threshold));
     }
-    for (index, weight) in rest.iter().enumerate() {
-        word |= u64::from(weight.inside(threshold)) << (8 * eights.len() + index);
+    let mut word = 0;
+    for (index, &eight) in bytes.as_chunks::<8>().0[..weights.len().div_ceil(8)].iter().enumerate() {
+        word |= (u64::from_le_bytes(eight).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * index);
     }
     word
 }
@@ -43,15 +42,16 @@ fn sign_word<W: Weight>(weights: &[W], threshold: W::Threshold) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample::private::Sealed as _;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
-        fn words_equal_a_plain_loop(weights in proptest::collection::vec(any::<i16>(), 0..=64), threshold in -300i32..300) {
+        fn words_equal_a_plain_loop(weights in proptest::collection::vec(any::<i16>(), 0..=64), isovalue in -129f32..129.0) {
             let plain = weights.iter().enumerate().fold(0, |word, (index, &weight)| {
-                word | u64::from(i32::from(weight) < threshold) << index
+                word | u64::from(f32::from(weight) / 256.0 < isovalue) << index
             });
-            prop_assert_eq!(sign_word(&weights, threshold), plain);
+            prop_assert_eq!(sign_word(&weights, i16::threshold(isovalue)), plain);
         }
     }
 }

@@ -9,6 +9,14 @@ use super::{Layout, shifted};
 pub(super) struct Row {
     /// The index of the row's first vertex on an edge along x, y and z.
     pub(super) first: [u32; 3],
+    empty: bool,
+}
+
+impl Row {
+    /// Whether no edge that starts in the row is crossed.
+    pub(super) const fn is_empty(&self) -> bool {
+        self.empty
+    }
 }
 
 /// The crossing words of one row: bit x is set where the edge from sample x to its +x, +y or +z neighbour is crossed.
@@ -55,9 +63,10 @@ pub(super) fn count(layout: &Layout, signs: &[u64], rows: &mut Vec<Row>) -> u64 
                 }
             }
             // Truncation does no harm: a total beyond `u32` is refused before the rows are read.
-            let [x, y, _] = counts;
-            rows.push(Row { first: [total as u32, (total + x) as u32, (total + x + y) as u32] });
-            total += counts.iter().sum::<u64>();
+            let [x, y, z] = counts;
+            let first = [total as u32, (total + x) as u32, (total + x + y) as u32];
+            rows.push(Row { first, empty: x + y + z == 0 });
+            total += x + y + z;
         }
     }
     total

@@ -42,19 +42,28 @@ impl CellRow<'_> {
             let mut end = indices.len();
             indices.resize(end + 15 * active.count_ones() as usize, 0);
             for x in set_bits(active) {
-                let case = (0..4).fold(0, |case, row| {
-                    case | (low[row] >> x & 1) << (2 * row) | (high[row] >> x & 1) << (2 * row + 1)
-                }) as usize;
+                let case = case_index(&low, &high, x);
                 let vertices = self.next.advance(CROSSED_EDGES[case]);
-                let room = &mut indices[end..end + 15];
-                for (corner, edge) in room.iter_mut().zip(TRIANGLES[case].as_flattened()) {
-                    *corner = vertices[edge.index()];
+                if let Some(room) = indices[end..].first_chunk_mut::<15>() {
+                    for (corner, edge) in room.iter_mut().zip(TRIANGLES[case].as_flattened()) {
+                        *corner = vertices[edge.index() & 15];
+                    }
                 }
                 end += 3 * TRIANGLE_COUNTS[case] as usize;
             }
             indices.truncate(end);
         }
     }
+}
+
+/// The case of cell `x` of a row, from the sign words of its low and high corners.
+#[inline(always)]
+fn case_index(low: &[u64; 4], high: &[u64; 4], x: usize) -> usize {
+    let mut case = 0;
+    for row in 0..4 {
+        case |= (low[row] >> x & 1) << (2 * row) | (high[row] >> x & 1) << (2 * row + 1);
+    }
+    case as usize
 }
 
 /// The next vertex on each edge of the cells of a row.
@@ -81,16 +90,17 @@ impl NextVertex {
     }
 
     /// The vertices on the twelve edges of the next active cell, which crosses the edges `crossed`; those of other
-    /// edges mean nothing.
+    /// edges mean nothing. (Sixteen, so that a masked index needs no check.)
     #[inline(always)]
-    fn advance(&mut self, crossed: u16) -> [u32; 12] {
+    fn advance(&mut self, crossed: u16) -> [u32; 16] {
         let has = |edge: u32| u32::from(crossed >> edge & 1);
         let y = [self.y[0] + has(4), self.y[1] + has(6)];
         let z = [self.z[0] + has(8), self.z[1] + has(10)];
         let vertices = [
             self.x[0], self.x[1], self.x[2], self.x[3], //
             self.y[0], y[0], self.y[1], y[1], //
-            self.z[0], z[0], self.z[1], z[1],
+            self.z[0], z[0], self.z[1], z[1], //
+            0, 0, 0, 0,
         ];
         for (edge, next) in self.x.iter_mut().enumerate() {
             *next += has(edge as u32);

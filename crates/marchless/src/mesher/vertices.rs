@@ -1,6 +1,10 @@
 //! Pass 3: one vertex for each crossing, with its position, normal and material.
 
-use super::{Layout, MeshSettings, crossings::RowCrossings, set_bits};
+use super::{
+    Layout, MeshSettings,
+    crossings::{Row, RowCrossings},
+    set_bits,
+};
 use crate::{
     buffer::MeshBuffer,
     lattice::Samples,
@@ -17,6 +21,7 @@ pub(super) fn place<W: Weight>(
     layout: &Layout,
     settings: &MeshSettings,
     signs: &[u64],
+    rows: &[Row],
     vertex_count: usize,
     out: &mut MeshBuffer,
 ) {
@@ -32,6 +37,7 @@ pub(super) fn place<W: Weight>(
         materials: samples.materials(),
         layout,
         signs,
+        rows,
         isovalue: settings.isovalue * W::SCALE,
         vertex: 0,
         out,
@@ -58,6 +64,7 @@ struct Vertices<'a, W> {
     materials: Option<&'a [u8]>,
     layout: &'a Layout,
     signs: &'a [u64],
+    rows: &'a [Row],
     /// In steps.
     isovalue: f32,
     /// The next vertex.
@@ -70,6 +77,9 @@ impl<W: Weight> Vertices<'_, W> {
         let layout = self.layout;
         for z in 0..layout.size[2] {
             for y in 0..layout.size[1] {
+                if self.rows[y + z * layout.size[1]].is_empty() {
+                    continue;
+                }
                 let crossings = RowCrossings::new(layout, self.signs, y, z);
                 self.row::<PADDED, 0>(&crossings, y, z);
                 self.row::<PADDED, 1>(&crossings, y, z);
@@ -83,8 +93,8 @@ impl<W: Weight> Vertices<'_, W> {
         let layout = self.layout;
         let start = layout.row_start(y, z);
         let inside = layout.row(self.signs, y + z * layout.size[1]);
-        let low_slopes = Slopes::new::<PADDED>(layout, [1, y, z]);
-        let high_slopes = Slopes::new::<PADDED>(layout, [1, y + usize::from(AXIS == 1), z + usize::from(AXIS == 2)]);
+        let mut low_slopes = Slopes::new::<PADDED>(layout, y, z);
+        let mut high_slopes = Slopes::new::<PADDED>(layout, y + usize::from(AXIS == 1), z + usize::from(AXIS == 2));
         for (word, &inside) in inside.iter().enumerate() {
             for bit in set_bits(crossings.word(word)[AXIS]) {
                 let x = word * 64 + bit;
@@ -96,19 +106,22 @@ impl<W: Weight> Vertices<'_, W> {
                 self.out.positions[self.vertex] = position;
                 let low_is_inside = inside >> bit & 1 == 1;
                 if let Some(normal) = self.out.normals.get_mut(self.vertex) {
-                    let (low_slopes, high_slopes) = if PADDED {
-                        (low_slopes, high_slopes)
-                    } else {
-                        (low_slopes.at_x(layout, x), high_slopes.at_x(layout, x + usize::from(AXIS == 0)))
+                    if !PADDED {
+                        low_slopes.set(layout, 0, x);
+                        high_slopes.set(layout, 0, x + usize::from(AXIS == 0));
+                    }
+                    let a = low_slopes.gradient::<PADDED, W>(self.weights, low);
+                    let b = high_slopes.gradient::<PADDED, W>(self.weights, high);
+                    *normal = match unit(mix(a, b, fraction)) {
+                        Some(normal) => normal,
+                        None => {
+                            let a = low_slopes.steady_gradient(self.weights, low);
+                            let b = high_slopes.steady_gradient(self.weights, high);
+                            let mut fallback = [0.0; 3];
+                            fallback[AXIS] = if low_is_inside { 1.0 } else { -1.0 };
+                            steady_unit(a, b, fraction, fallback)
+                        }
                     };
-                    let (a, b) = (low_slopes.gradient(self.weights, low), high_slopes.gradient(self.weights, high));
-                    let gradient = [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * fraction);
-                    *normal = unit(gradient).unwrap_or_else(|| {
-                        let (a, b) = (low_slopes.steady(self.weights, low), high_slopes.steady(self.weights, high));
-                        let mut fallback = [0.0; 3];
-                        fallback[AXIS] = if low_is_inside { 1.0 } else { -1.0 };
-                        steady_unit(a, b, fraction, fallback)
-                    });
                 }
                 if let Some(materials) = self.materials {
                     self.out.materials[self.vertex] = materials[if low_is_inside { low } else { high }];
@@ -119,61 +132,62 @@ impl<W: Weight> Vertices<'_, W> {
     }
 }
 
-/// Which neighbours of a sample its gradient reads: how far below and above it along each axis they lie, and the factor that makes
-/// one-sided differences (twice as steep for their distance) comparable.
-#[derive(Clone, Copy)]
+/// Which neighbours of a sample its gradient reads: how far below and above it along each axis they lie in memory, and the
+/// factor that makes one-sided differences comparable to central ones, which span twice the distance.
 struct Slopes {
-    low: [usize; 3],
-    high: [usize; 3],
+    below: [usize; 3],
+    above: [usize; 3],
     scale: [f32; 3],
 }
 
 impl Slopes {
-    /// For the sample at `point`, in meshed samples.
+    /// For the samples of row `y`, `z`.
     #[inline(always)]
-    fn new<const PADDED: bool>(layout: &Layout, point: [usize; 3]) -> Self {
-        let mut slopes = Self { low: layout.strides, high: layout.strides, scale: [1.0; 3] };
+    fn new<const PADDED: bool>(layout: &Layout, y: usize, z: usize) -> Self {
+        let mut slopes = Self { below: layout.strides, above: layout.strides, scale: [1.0; 3] };
         if !PADDED {
-            for axis in 1..3 {
-                slopes.border(layout, axis, point[axis]);
-            }
+            slopes.set(layout, 1, y);
+            slopes.set(layout, 2, z);
         }
         slopes
     }
 
-    /// The same for another x, at the border or not.
+    /// Reads one-sided differences along `axis` where `at` lies at the border.
     #[inline(always)]
-    fn at_x(mut self, layout: &Layout, x: usize) -> Self {
-        self.border(layout, 0, x);
-        self
-    }
-
-    #[inline(always)]
-    fn border(&mut self, layout: &Layout, axis: usize, at: usize) {
-        if at == 0 {
-            self.low[axis] = 0;
-            self.scale[axis] = 2.0;
-        } else if at + 1 >= layout.size[axis] {
-            self.high[axis] = 0;
-            self.scale[axis] = 2.0;
-        }
+    fn set(&mut self, layout: &Layout, axis: usize, at: usize) {
+        let (first, last) = (at == 0, at + 1 >= layout.size[axis]);
+        self.below[axis] = if first { 0 } else { layout.strides[axis] };
+        self.above[axis] = if last { 0 } else { layout.strides[axis] };
+        self.scale[axis] = if first | last { 2.0 } else { 1.0 };
     }
 
     /// Twice the gradient at sample `index`.
     #[inline(always)]
-    fn gradient<W: Weight>(&self, weights: &[W], index: usize) -> [f32; 3] {
-        [0, 1, 2].map(|axis| {
-            (weights[index + self.high[axis]].raw() - weights[index - self.low[axis]].raw()) * self.scale[axis]
-        })
+    fn gradient<const PADDED: bool, W: Weight>(&self, weights: &[W], index: usize) -> [f32; 3] {
+        let mut gradient = [0.0; 3];
+        for (axis, slope) in gradient.iter_mut().enumerate() {
+            *slope = weights[index + self.above[axis]].raw() - weights[index - self.below[axis]].raw();
+            if !PADDED {
+                *slope *= self.scale[axis];
+            }
+        }
+        gradient
     }
 
-    /// The same, for samples whose differences overflow.
-    fn steady<W: Weight>(&self, weights: &[W], index: usize) -> [f64; 3] {
+    /// The same, where differences may overflow.
+    fn steady_gradient<W: Weight>(&self, weights: &[W], index: usize) -> [f64; 3] {
         [0, 1, 2].map(|axis| {
-            let difference = weights[index + self.high[axis]].finite() - weights[index - self.low[axis]].finite();
-            difference * f64::from(self.scale[axis])
+            let slope = weights[index + self.above[axis]].finite() - weights[index - self.below[axis]].finite();
+            slope * f64::from(self.scale[axis])
         })
     }
+}
+
+#[inline(always)]
+fn mix(a: [f32; 3], b: [f32; 3], fraction: f32) -> [f32; 3] {
+    let [ax, ay, az] = a;
+    let [bx, by, bz] = b;
+    [ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction]
 }
 
 /// The direction of `gradient`, where its length can be computed well in `f32`.
@@ -181,10 +195,11 @@ impl Slopes {
 fn unit(gradient: [f32; 3]) -> Option<[f32; 3]> {
     let [x, y, z] = gradient;
     let squared = x * x + y * y + z * z;
-    (1e-30..1e30).contains(&squared).then(|| {
-        let scale = 1.0 / sqrt(squared);
-        gradient.map(|v| v * scale)
-    })
+    if !(1e-30..1e30).contains(&squared) {
+        return None;
+    }
+    let scale = 1.0 / sqrt(squared);
+    Some([x * scale, y * scale, z * scale])
 }
 
 /// The direction of a gradient that is tiny, huge, not finite or zero; `fallback` where it has none.
@@ -202,8 +217,12 @@ fn steady_unit(a: [f64; 3], b: [f64; 3], fraction: f32, fallback: [f32; 3]) -> [
 
 fn bounds(positions: &[[f32; 3]]) -> Option<[[f32; 3]; 2]> {
     let &first = positions.first()?;
-    let [min, max] = positions.iter().fold([first; 2], |[min, max], position| {
-        [[0, 1, 2].map(|k| min[k].min(position[k])), [0, 1, 2].map(|k| max[k].max(position[k]))]
-    });
+    let (mut min, mut max) = (first, first);
+    for position in positions {
+        for axis in 0..3 {
+            min[axis] = if position[axis] < min[axis] { position[axis] } else { min[axis] };
+            max[axis] = if position[axis] > max[axis] { position[axis] } else { max[axis] };
+        }
+    }
     Some([min, max])
 }
