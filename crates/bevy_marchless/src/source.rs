@@ -1,0 +1,134 @@
+//! Sources: what a terrain is made of before anybody digs.
+//!
+//! # Choosing one
+//!
+//! | you have | take | chunks skipped without sampling | time to fill |
+//! |---|---|---|---|
+//! | nothing yet: rolling hills, ridges | [`NoiseHeights`] (feature `noise`) | above and below the hills | once per column |
+//! | a wish for caves and overhangs | [`NoiseDensity`] (feature `noise`) | above its ground | once per sample: the slowest |
+//! | real elevation, or a painted picture | [`HeightMap`] (feature `png`) | above and below its relief | once per column |
+//! | geometry: asteroids, rooms, tunnels | [`Sdf`] | wherever the surface is far | once per sample and nearby shape |
+//! | a formula | a closure `Fn([f64; 3]) -> f64` | none | once per sample |
+//! | an empty space to draw in | [`Air`] | all | nothing |
+//! | something else | your own [`Source`] | those that its `bound` names | yours |
+//!
+//! All of them say how far from the surface a point is: negative inside, positive outside. Near the surface this should
+//! be close to a true distance, since it decides where the mesh's vertices lie and how smooth its normals are; far away
+//! only the sign matters. Positions are in world units in the terrain's own space, whose origin is the terrain's lowest
+//! corner and in which y points up.
+//!
+//! Materials come from the source too: an [`Sdf`] has one per shape, the others take theirs from a list of [`Stratum`].
+//!
+//! Sources are floating point: they promise the same samples on the same machine and build, and nothing across
+//! machines.
+
+#[cfg(any(feature = "noise", feature = "png"))]
+mod height_field;
+#[cfg(feature = "png")]
+mod height_map;
+#[cfg(feature = "noise")]
+mod noise;
+mod sdf;
+mod strata;
+
+use bevy_app::App;
+use bevy_reflect::Reflect;
+use thiserror::Error;
+
+#[cfg(feature = "png")]
+pub use height_map::{HeightMap, HeightMapError, HeightMapSettings};
+pub use marchless::{Bound, Source, SourceRegion};
+#[cfg(feature = "noise")]
+pub use noise::{Fractal, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings};
+pub use sdf::Sdf;
+pub use strata::Stratum;
+
+/// Nothing but air: an empty space to draw in, or what a cleared terrain is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+pub struct Air;
+
+impl Source for Air {
+    fn fill(&self, _region: &SourceRegion, distances: &mut [f32], _materials: &mut [u8]) {
+        distances.fill(f32::MAX);
+    }
+
+    fn bound(&self, _region: &SourceRegion) -> Bound {
+        Bound::Outside
+    }
+}
+
+/// Why settings do not make a source.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SourceError {
+    /// A number is not finite or out of its range.
+    #[error("{name} must be {expected}, but it is {found}")]
+    Setting {
+        /// What the number is.
+        name: &'static str,
+        /// Which numbers are allowed.
+        expected: &'static str,
+        /// What was given.
+        found: f64,
+    },
+}
+
+/// Heights, positions and lengths reach at most this far, in world units.
+pub(crate) const FARTHEST: f64 = 1e9;
+
+/// How many voxels away from the surface a region must be before a bound skips it, so that an isovalue other than zero
+/// still finds samples.
+pub(crate) const ROOM: f64 = 4.0;
+
+/// `found`, where it is `valid`.
+pub(crate) fn check(
+    name: &'static str,
+    expected: &'static str,
+    found: f64,
+    valid: impl FnOnce(f64) -> bool,
+) -> Result<f64, SourceError> {
+    if valid(found) { Ok(found) } else { Err(SourceError::Setting { name, expected, found }) }
+}
+
+/// A length: more than 0 and at most [`FARTHEST`].
+pub(crate) fn check_length(name: &'static str, found: f64) -> Result<f64, SourceError> {
+    check(name, "more than 0 and at most 1e9", found, |v| v > 0.0 && v <= FARTHEST)
+}
+
+/// A coordinate: from −[`FARTHEST`] to [`FARTHEST`].
+pub(crate) fn check_position(name: &'static str, found: f64) -> Result<f64, SourceError> {
+    check(name, "from -1e9 to 1e9", found, |v| v.abs() <= FARTHEST)
+}
+
+/// The lowest and highest coordinate per axis of a region's samples, in world units.
+pub(crate) fn world_box(region: &SourceRegion) -> [[f64; 2]; 3] {
+    core::array::from_fn(|axis| {
+        let min = f64::from(region.min[axis]);
+        let ends = [min, min + f64::from(region.size[axis].saturating_sub(1))];
+        ends.map(|point| point * region.spacing)
+    })
+}
+
+/// A region's rows along x: local y and z of each, its distances and its materials.
+pub(crate) fn rows<'a>(
+    region: &SourceRegion,
+    distances: &'a mut [f32],
+    materials: &'a mut [u8],
+) -> impl Iterator<Item = ([u32; 2], &'a mut [f32], &'a mut [u8])> {
+    let [nx, ny, _] = region.size.map(|points| points.max(1));
+    let rows = distances.chunks_exact_mut(nx as usize).zip(materials.chunks_exact_mut(nx as usize));
+    rows.zip(0u32..).map(move |((distances, materials), row)| ([row % ny, row / ny], distances, materials))
+}
+
+/// Registers the sources and their settings for reflection.
+pub(crate) fn register_types(app: &mut App) {
+    app.register_type::<Air>().register_type::<Sdf>().register_type::<Stratum>();
+    #[cfg(feature = "noise")]
+    app.register_type::<Fractal>()
+        .register_type::<NoiseHeights>()
+        .register_type::<NoiseHeightsSettings>()
+        .register_type::<NoiseDensity>()
+        .register_type::<NoiseDensitySettings>();
+    #[cfg(feature = "png")]
+    app.register_type::<HeightMap>().register_type::<HeightMapSettings>();
+}

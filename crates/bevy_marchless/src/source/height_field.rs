@@ -1,0 +1,89 @@
+//! Height fields: one height per column, turned into distances and materials.
+
+use marchless::{Bound, SourceRegion};
+
+use super::strata::{Stratum, material_at, material_within};
+use super::{ROOM, rows, world_box};
+
+/// A height for each column, in world units.
+pub(crate) trait HeightField {
+    /// The height of the ground at a position.
+    fn height(&self, x: f64, z: f64) -> f64;
+
+    /// Two heights between which all heights of a rectangle lie, given by its lowest and highest x and z.
+    fn range(&self, x: [f64; 2], z: [f64; 2]) -> [f64; 2];
+}
+
+/// The ground of one column.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Column {
+    /// World units.
+    pub(crate) height: f64,
+    /// Rise per run, 0 or more.
+    pub(crate) slope: f64,
+}
+
+impl Column {
+    /// The distance to the ground of a point `above` world units over it, taking the ground for a slope that goes on.
+    pub(crate) fn distance(self, above: f64) -> f64 {
+        above / (1.0 + self.slope * self.slope).sqrt()
+    }
+}
+
+/// The ground of each column of a region, x fastest. Each height is evaluated once; slopes are central differences, and
+/// so depend on nothing but the column's position and the spacing.
+pub(crate) fn columns(field: &impl HeightField, region: &SourceRegion) -> Vec<Column> {
+    let [nx, _, nz] = region.size.map(|points| points as usize);
+    let at = |axis: usize, index: usize| (f64::from(region.min[axis]) + index as f64 - 1.0) * region.spacing;
+    let width = nx + 2;
+    let heights: Vec<f64> =
+        (0..nz + 2).flat_map(|z| (0..width).map(move |x| field.height(at(0, x), at(2, z)))).collect();
+    let run = 2.0 * region.spacing;
+    (0..nz)
+        .flat_map(|z| (0..nx).map(move |x| x + 1 + width * (z + 1)))
+        .map(|index| {
+            let along_x = (heights[index + 1] - heights[index - 1]) / run;
+            let along_z = (heights[index + width] - heights[index - width]) / run;
+            Column { height: heights[index], slope: (along_x * along_x + along_z * along_z).sqrt() }
+        })
+        .collect()
+}
+
+/// [`Source::fill`](marchless::Source::fill) of a height field.
+pub(crate) fn fill(
+    field: &impl HeightField,
+    strata: &[Stratum],
+    region: &SourceRegion,
+    distances: &mut [f32],
+    materials: &mut [u8],
+) {
+    let columns = columns(field, region);
+    let nx = region.size[0] as usize;
+    for ([y, z], distances, materials) in rows(region, distances, materials) {
+        let y = (f64::from(region.min[1]) + f64::from(y)) * region.spacing;
+        let columns = &columns[nx * z as usize..];
+        for ((column, distance), material) in columns.iter().zip(distances).zip(materials) {
+            let above = y - column.height;
+            *distance = (column.distance(above) / region.spacing) as f32;
+            if above < 0.0 {
+                *material = material_at(strata, -above, y, column.slope);
+            }
+        }
+    }
+}
+
+/// [`Source::bound`](marchless::Source::bound) of a height field.
+pub(crate) fn bound(field: &impl HeightField, strata: &[Stratum], region: &SourceRegion) -> Bound {
+    let [x, [bottom, top], z] = world_box(region);
+    let [lowest, highest] = field.range(x, z);
+    let room = ROOM * region.spacing;
+    if bottom > highest + room {
+        Bound::Outside
+    } else if top < lowest - room
+        && let Some(material) = material_within(strata, [lowest - top, highest - bottom], [bottom, top])
+    {
+        Bound::Inside { material }
+    } else {
+        Bound::Mixed
+    }
+}
