@@ -23,13 +23,7 @@ pub struct MeshBuffer {
 impl MeshBuffer {
     /// An empty buffer; allocates nothing.
     pub const fn new() -> Self {
-        Self {
-            positions: Vec::new(),
-            normals: Vec::new(),
-            materials: Vec::new(),
-            indices: Vec::new(),
-            bounds: None,
-        }
+        Self { positions: Vec::new(), normals: Vec::new(), materials: Vec::new(), indices: Vec::new(), bounds: None }
     }
 
     /// Empties the buffer and keeps its memory.
