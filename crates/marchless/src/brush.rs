@@ -21,6 +21,8 @@ mod apply;
 mod change;
 mod edit;
 mod shape;
+#[cfg(test)]
+mod tests;
 
 use core::time::Duration;
 

@@ -55,11 +55,11 @@ impl Chunk<i16> {
     /// samples are written out or copied only where some of them change.
     ///
     /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes of
-    /// a bounded grid ([`Grid::planes`]), whose border stays closed. Nothing changes
-    /// in a chunk whose samples are not `cells³`, or where no chunk has so many.
+    /// a bounded grid ([`Grid::planes`]): its border stays closed, and nothing changes beyond. Nothing changes either in
+    /// a chunk whose samples are not `cells³`, or where no chunk has so many.
     pub fn apply_stamp(&mut self, origin: [i32; 3], cells: u32, planes: Option<Region>, stamp: &Stamp) -> Edit {
         let chunk = Region::new(origin, origin.map(|v| v.saturating_add_unsigned(cells)));
-        let area = chunk.intersection(&stamp.region());
+        let area = planes.map_or(chunk, |planes| chunk.intersection(&planes)).intersection(&stamp.region());
         let cells_fit = (MIN_CHUNK_CELLS..=MAX_CHUNK_CELLS).contains(&cells) && self.check(cells).is_ok();
         if area.is_empty() || !cells_fit {
             return Edit::NONE;

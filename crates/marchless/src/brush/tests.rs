@@ -1,0 +1,446 @@
+//! Brushes against plain oracles.
+
+use alloc::{collections::BTreeSet, string::ToString as _, sync::Arc, vec, vec::Vec};
+use core::time::Duration;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    grid::{Chunk, Grid},
+    sample::Voxel,
+};
+
+const CELLS: u32 = 8;
+const BOUNDS: Region = Region::new([-1, 0, -1], [1, 2, 1]);
+
+/// All the points of the test grids, one beyond the high planes left out.
+fn all_points() -> impl Iterator<Item = [i32; 3]> {
+    let scaled = |v: i32| v * CELLS as i32;
+    Region::new(BOUNDS.min.map(scaled), BOUNDS.max.map(scaled)).points()
+}
+
+/// A grid that is solid in one place, air in another and noise between, with weights beyond the limit of edits.
+fn grid(seed: u64, bounded: bool) -> Grid<i16> {
+    let mut grid = if bounded { Grid::bounded(CELLS, BOUNDS) } else { Grid::new(CELLS) }.unwrap();
+    let mut state = seed | 1;
+    for (number, position) in BOUNDS.points().enumerate() {
+        let chunk = match (number as u64 + seed) % 4 {
+            0 => Chunk::Uniform(Voxel::new(-3000, 7)),
+            1 if !bounded => continue,
+            1 => Chunk::AIR,
+            _ => {
+                let mut next = || {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    state >> 33
+                };
+                let weights = (0..CELLS.pow(3)).map(|_| (next() % 3000) as i16 - 1500).collect();
+                let materials = (0..CELLS.pow(3)).map(|_| (next() % 3) as u8).collect();
+                Chunk::from_samples(weights, materials, CELLS).unwrap()
+            }
+        };
+        grid.insert(position, chunk).unwrap();
+    }
+    grid.take_dirty();
+    grid
+}
+
+fn read(grid: &Grid<i16>) -> Vec<Voxel> {
+    all_points().map(|point| grid.get(point)).collect()
+}
+
+prop_compose! {
+    fn small_position()(p in prop::array::uniform3(-20 * 256i64..28 * 256)) -> [i64; 3] { p }
+}
+
+fn small_shape() -> impl Strategy<Value = BrushShape> {
+    prop_oneof![
+        (small_position(), 1u32..12 * 256).prop_map(|(center, radius)| BrushShape::Sphere { center, radius }),
+        (small_position(), prop::array::uniform3(1u32..12 * 256))
+            .prop_map(|(center, half_size)| BrushShape::Box { center, half_size }),
+        (small_position(), small_position(), 1u32..8 * 256).prop_map(|(a, b, radius)| BrushShape::Capsule {
+            a,
+            b,
+            radius
+        }),
+    ]
+}
+
+fn any_shape() -> impl Strategy<Value = BrushShape> {
+    let number = || prop_oneof![Just(i64::MIN), Just(i64::MAX), any::<i64>(), -100_000i64..100_000];
+    let position = move || prop::array::uniform3(number());
+    let size = || prop_oneof![Just(0), Just(u32::MAX), any::<u32>(), 0u32..10_000];
+    prop_oneof![
+        (position(), size()).prop_map(|(center, radius)| BrushShape::Sphere { center, radius }),
+        (position(), prop::array::uniform3(size()))
+            .prop_map(|(center, half_size)| BrushShape::Box { center, half_size }),
+        (position(), position(), size()).prop_map(|(a, b, radius)| BrushShape::Capsule { a, b, radius }),
+    ]
+}
+
+fn operation() -> impl Strategy<Value = Operation> {
+    prop_oneof![Just(Operation::Add), Just(Operation::Dig), Just(Operation::Paint)]
+}
+
+fn stroke() -> impl Strategy<Value = Stroke> {
+    (0u32..20_000, 0u32..2000, 0u64..1_000_000, 0u64..1_000_000).prop_map(|(rate, falloff, start_us, span)| Stroke {
+        id: 1,
+        rate,
+        falloff,
+        start_us,
+        end_us: start_us + span,
+    })
+}
+
+fn stamp() -> impl Strategy<Value = Stamp> {
+    (small_shape(), operation(), 0u8..5, prop::option::of(stroke()))
+        .prop_map(|(shape, operation, material, stroke)| Stamp { shape, operation, material, stroke })
+}
+
+/// The distance as a textbook has it, in units.
+fn distance_oracle(shape: &BrushShape, point: [i32; 3]) -> f64 {
+    let from = |p: [i64; 3]| [0, 1, 2].map(|i| f64::from(point[i]) * 256.0 - p[i] as f64);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let length = |a: [f64; 3]| dot(a, a).sqrt();
+    match *shape {
+        BrushShape::Sphere { center, radius } => length(from(center)) - f64::from(radius),
+        BrushShape::Box { center, half_size } => {
+            let offset = from(center);
+            let q = [0, 1, 2].map(|i| offset[i].abs() - f64::from(half_size[i]));
+            length(q.map(|v| v.max(0.0))) + q[0].max(q[1]).max(q[2]).min(0.0)
+        }
+        BrushShape::Capsule { a, b, radius } => {
+            let (from_a, along) = (from(a), [0, 1, 2].map(|i| (b[i] - a[i]) as f64));
+            let t = if a == b { 0.0 } else { (dot(from_a, along) / dot(along, along)).clamp(0.0, 1.0) };
+            length([0, 1, 2].map(|i| from_a[i] - along[i] * t)) - f64::from(radius)
+        }
+    }
+}
+
+/// What a stamp makes of a sample, straight from its definition.
+fn change_oracle(stamp: &Stamp, old: Voxel, point: [i32; 3], floor: i32) -> Voxel {
+    let distance = stamp.shape.distance(point);
+    let clamp = |weight: i32| weight.clamp(floor, 1024);
+    let now = clamp(old.weight.into());
+    if stamp.operation == Operation::Paint {
+        return if old.weight < 0 && distance < 0 { Voxel::new(old.weight, stamp.material) } else { old };
+    }
+    let new = match stamp.stroke {
+        None if stamp.operation == Operation::Add => clamp(now.min(distance)),
+        None => clamp(now.max(-distance)),
+        Some(stroke) => {
+            let falloff = i128::from(stroke.falloff.max(1));
+            let depth = i128::from(-distance).clamp(0, falloff);
+            let until = |time: u64| i128::from(stroke.rate) * depth * i128::from(time) / (falloff * 1_000_000);
+            let moved = (until(stroke.end_us) - until(stroke.start_us)).clamp(0, 5000) as i32;
+            clamp(if stamp.operation == Operation::Add { now - moved } else { now + moved })
+        }
+    };
+    let weight = if new == now { old.weight } else { new as i16 };
+    Voxel::new(weight, if old.weight >= 0 && weight < 0 { stamp.material } else { old.material })
+}
+
+/// The least weight at a point of the bounded test grid.
+fn floor_oracle(point: [i32; 3]) -> i32 {
+    let cells = CELLS as i32;
+    let depth = (0..3).map(|i| (point[i] - BOUNDS.min[i] * cells).min(BOUNDS.max[i] * cells - point[i])).min().unwrap();
+    if depth <= 4 { 128 - 256 * depth } else { -1024 }
+}
+
+/// The smallest region that holds all the points where `before` and `after` differ.
+fn difference(before: &[Voxel], after: &[Voxel], within: Region) -> Region {
+    let mut region = Edit::NONE.region;
+    for (point, (old, new)) in all_points().zip(before.iter().zip(after)) {
+        if old != new && within.contains(point) {
+            region = region.union(&Region::new(point, point.map(|v| v + 1)));
+        }
+    }
+    region
+}
+
+proptest! {
+    #[test]
+    fn distances_are_those_of_a_textbook(shape in small_shape(), point in prop::array::uniform3(-60i32..60)) {
+        let (found, exact) = (f64::from(shape.distance(point)), distance_oracle(&shape, point));
+        prop_assert!((found - exact).abs() <= 1.0, "{found}, not {exact}");
+        prop_assert!(exact.abs() < 1e-6 || (found < 0.0) == (exact < 0.0), "{found}, not {exact}");
+    }
+
+    #[test]
+    fn distances_far_out_are_those_of_a_textbook_or_saturate(
+        center in prop::array::uniform3(-(1i64 << 38)..1 << 38),
+        length in prop::array::uniform3(-(1i64 << 19)..1 << 19),
+        radius in 1u32..1 << 18,
+        points in prop::array::uniform2(prop::array::uniform3(any::<i32>())),
+        step in prop::array::uniform3(-100_000i32..100_000),
+    ) {
+        let near = [0, 1, 2].map(|i| (center[i] / 256) as i32 + step[i]);
+        let b = [0, 1, 2].map(|i| (center[i] + length[i]).clamp(-(1 << 38), 1 << 38));
+        for shape in [
+            BrushShape::Sphere { center, radius },
+            BrushShape::Box { center, half_size: [radius, 100, radius] },
+            BrushShape::Capsule { a: center, b, radius },
+        ] {
+            for point in [near, points[0], points[1]] {
+                let (found, exact) = (f64::from(shape.distance(point)), distance_oracle(&shape, point));
+                prop_assert!((found - exact.min(f64::from(1 << 30))).abs() <= 1.01, "{shape:?} {point:?}: {found}, not {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn clamped_distances_are_distances_clamped(
+        shape in small_shape(), point in prop::array::uniform3(-60i32..60), low in -3000i32..=0, high in 0i32..3000,
+    ) {
+        prop_assert_eq!(shape.distance_within(point, low, high), shape.distance(point).clamp(low, high));
+    }
+
+    #[test]
+    fn regions_hold_exactly_the_points_near_enough(shape in small_shape(), margin in 0u32..6) {
+        let region = shape.region(margin);
+        let mut near = Edit::NONE.region;
+        for point in region.grown(2, 2).points() {
+            if shape.distance(point) < margin as i32 * 256 {
+                prop_assert!(region.contains(point), "{point:?} is near, but outside of {region:?}");
+                near = near.union(&Region::new(point, point.map(|v| v + 1)));
+            }
+        }
+        if let BrushShape::Box { .. } = shape && margin == 0 && !near.is_empty() {
+            prop_assert_eq!(near, region);
+        }
+    }
+
+    #[test]
+    fn edits_are_what_their_definition_says(seed: u64, bounded: bool, stamps in prop::collection::vec(stamp(), 1..4)) {
+        let mut grid = grid(seed, bounded);
+        for stamp in &stamps {
+            let before = read(&grid);
+            let edit = grid.apply(stamp);
+            let after = read(&grid);
+            let mut volumes = [VolumeByMaterial::new(), VolumeByMaterial::new()];
+            for (point, (old, new)) in all_points().zip(before.iter().zip(&after)) {
+                let floor = if bounded { floor_oracle(point) } else { -1024 };
+                prop_assert_eq!(*new, change_oracle(stamp, *old, point, floor), "{:?} was {:?}", point, old);
+                match (old.weight < 0, new.weight < 0) {
+                    (false, true) => volumes[0].add(new.material, 1),
+                    (true, false) => volumes[1].add(old.material, 1),
+                    _ => {}
+                }
+            }
+            if bounded {
+                let everywhere = Region::new([-100; 3], [100; 3]);
+                prop_assert_eq!(edit.region, difference(&before, &after, everywhere));
+                prop_assert_eq!([edit.added, edit.removed], volumes);
+                let mut dirty = BTreeSet::new();
+                for position in BOUNDS.points() {
+                    let changed = difference(&before, &after, grid.chunk_region(position));
+                    dirty.extend(grid.chunks_affected_by(changed).points());
+                }
+                prop_assert_eq!(grid.take_dirty(), dirty);
+            }
+        }
+    }
+
+    #[test]
+    fn bounded_grids_stay_closed(seed: u64, stamps in prop::collection::vec(stamp(), 1..6)) {
+        let mut grid = grid(seed, true);
+        for stamp in &stamps {
+            grid.apply(stamp);
+        }
+        prop_assert_eq!(grid.chunks().count(), 8);
+        for point in all_points() {
+            let weight = i32::from(grid.get(point).weight);
+            prop_assert!(floor_oracle(point) == -1024 || weight >= floor_oracle(point), "{point:?}: {weight}");
+        }
+    }
+
+    #[test]
+    fn chunks_may_take_their_stamps_in_their_own_time(
+        seed: u64,
+        bounded: bool,
+        stamps in prop::collection::vec(stamp(), 1..5),
+        turns in prop::collection::vec(0usize..8, 0..40),
+    ) {
+        let (mut at_once, mut in_turns) = (grid(seed, bounded), grid(seed, bounded));
+        let mut edit = Edit::NONE;
+        for stamp in &stamps {
+            edit.merge(&at_once.apply(stamp));
+        }
+        // Beyond the bounds of the tests, where an unbounded grid grows, only one of the two is looked at.
+        let positions = BOUNDS.points().collect::<Vec<_>>();
+        let mut done = [0; 8];
+        let mut edit_in_turns = Edit::NONE;
+        for chunk in turns.into_iter().chain((0..8).flat_map(|chunk| vec![chunk; stamps.len()])) {
+            if let Some(stamp) = stamps.get(done[chunk]) {
+                edit_in_turns.merge(&in_turns.apply_to_chunk(positions[chunk], stamp));
+                done[chunk] += 1;
+            }
+        }
+        prop_assert_eq!(read(&at_once), read(&in_turns));
+        if bounded {
+            prop_assert_eq!(edit, edit_in_turns);
+            prop_assert_eq!(at_once.take_dirty(), in_turns.take_dirty());
+        }
+    }
+
+    #[test]
+    fn strokes_do_not_depend_on_how_time_is_cut(
+        seed: u64,
+        bounded: bool,
+        shape in small_shape(),
+        dig: bool,
+        stroke in stroke(),
+        cuts in prop::collection::vec(0u64..2_000_000, 0..12),
+    ) {
+        let (mut whole, mut cut) = (grid(seed, bounded), grid(seed, bounded));
+        let stamp = Stamp::new(shape, if dig { Operation::Dig } else { Operation::Add }, 9);
+        let expected = whole.apply(&stamp.with_stroke(stroke));
+        let mut times = cuts.iter().map(|cut| (*cut).clamp(stroke.start_us, stroke.end_us)).collect::<Vec<_>>();
+        times.extend([stroke.start_us, stroke.end_us]);
+        times.sort_unstable();
+        let mut edit = Edit::NONE;
+        for part in times.windows(2) {
+            edit.merge(&cut.apply(&stamp.with_stroke(Stroke { start_us: part[0], end_us: part[1], ..stroke })));
+        }
+        prop_assert_eq!(read(&whole), read(&cut));
+        prop_assert_eq!(expected, edit);
+    }
+
+    #[test]
+    fn eight_voxels_of_change_turn_everything(seed: u64, shape in small_shape()) {
+        let mut grid = grid(seed, false);
+        let stroke = Stroke { id: 1, rate: 8 * 256, falloff: 0, start_us: 0, end_us: 1_000_000 };
+        let inside = all_points().filter(|point| shape.distance(*point) < 0).collect::<Vec<_>>();
+        for (operation, expected) in [(Operation::Dig, 1024), (Operation::Add, -1024), (Operation::Dig, 1024)] {
+            grid.apply(&Stamp::new(shape, operation, 5).with_stroke(stroke));
+            for &point in &inside {
+                let weight = i32::from(grid.get(point).weight);
+                prop_assert!(weight == expected || weight.abs() > 1024 && weight.signum() == expected.signum());
+            }
+        }
+    }
+
+    #[test]
+    fn extreme_stamps_do_no_harm(
+        shape in any_shape(),
+        operation in operation(),
+        stroke in prop::option::of((
+            prop_oneof![Just(u32::MAX), any::<u32>()],
+            prop_oneof![Just(0), Just(1), Just(u32::MAX), any::<u32>()],
+            prop_oneof![Just(0), Just(u64::MAX), any::<u64>()],
+            prop_oneof![Just(0), Just(u64::MAX), any::<u64>()],
+        )),
+        seed: u64,
+        point in prop::array::uniform3(prop_oneof![Just(i32::MIN), Just(i32::MAX), any::<i32>()]),
+    ) {
+        let stroke = stroke.map(|(rate, falloff, start_us, end_us)| Stroke { id: 0, rate, falloff, start_us, end_us });
+        let stamp = Stamp { shape, operation, material: 1, stroke };
+        let mut grid = grid(seed, true);
+        grid.apply(&stamp);
+        stamp.shape.distance(point);
+        let whole = Chunk::Uniform(Voxel::new(-1, 0));
+        for cells in [0, CELLS, 62, 63, u32::MAX] {
+            for planes in [None, Some(stamp.region()), Some(Region::new([i32::MAX; 3], [i32::MIN; 3]))] {
+                whole.clone().apply_stamp(point, cells, planes, &stamp);
+                whole.clone().apply_stamp(stamp.region().min, cells, planes, &stamp);
+            }
+        }
+    }
+}
+
+#[test]
+fn uniform_chunks_stay_uniform_where_they_can() {
+    let solid = Chunk::Uniform(Voxel::new(i16::MIN, 3));
+    let everything = BrushShape::sphere([4.0; 3], 100.0).unwrap();
+    let dig = Stamp::new(everything, Operation::Dig, 0);
+
+    let mut chunk = solid.clone();
+    let edit = chunk.apply_stamp([0; 3], 8, None, &dig);
+    assert_eq!(chunk, Chunk::Uniform(Voxel::new(EDIT_LIMIT, 3)));
+    assert_eq!((edit.region, edit.removed.get(3)), (Region::new([0; 3], [8; 3]), 512));
+    assert!(chunk.apply_stamp([0; 3], 8, None, &dig).is_empty());
+    let edit = chunk.apply_stamp([0; 3], 8, None, &Stamp::new(everything, Operation::Add, 4));
+    assert_eq!(chunk, Chunk::Uniform(Voxel::new(-EDIT_LIMIT, 4)));
+    assert_eq!(edit.added.get(4), 512);
+
+    let mut air = Chunk::AIR;
+    let partly = Stamp::new(BrushShape::sphere([0.0; 3], 3.0).unwrap(), Operation::Dig, 0);
+    assert!(air.apply_stamp([0; 3], 8, None, &partly).is_empty());
+    assert_eq!(air, Chunk::AIR);
+
+    let mut grid = Grid::<i16>::new(8).unwrap();
+    assert!(grid.apply(&partly).is_empty());
+    assert!(grid.chunks().next().is_none() && grid.dirty().is_empty());
+}
+
+#[test]
+fn samples_are_shared_until_one_changes() {
+    let weights = (0..512).map(|v| v - 256).collect();
+    let original = Chunk::from_samples(weights, vec![1; 512], 8).unwrap();
+    let shares = |chunk: &Chunk| match (chunk, &original) {
+        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
+        _ => false,
+    };
+    let mut chunk = original.clone();
+    let shape = BrushShape::sphere([4.0; 3], 2.0).unwrap();
+    assert!(chunk.apply_stamp([0; 3], 8, None, &Stamp::new(shape, Operation::Paint, 1)).is_empty());
+    assert!(shares(&chunk));
+    assert!(!chunk.apply_stamp([0; 3], 8, None, &Stamp::new(shape, Operation::Paint, 2)).is_empty());
+    assert!(!shares(&chunk));
+}
+
+#[test]
+fn a_dug_ball_is_as_large_as_a_ball() {
+    let mut grid = Grid::<i16>::new(32).unwrap();
+    for position in Region::new([-1; 3], [1; 3]).points() {
+        grid.insert(position, Chunk::Uniform(Voxel::new(i16::MIN, 2))).unwrap();
+    }
+    let edit = grid.apply(&Stamp::new(BrushShape::sphere([0.0; 3], 10.0).unwrap(), Operation::Dig, 0));
+    let exact = Region::new([-10; 3], [11; 3]).points().filter(|p| p.iter().map(|v| v * v).sum::<i32>() <= 100);
+    assert_eq!(edit.removed.get(2), exact.count() as u64);
+    assert_eq!((edit.removed.total(), edit.added.total()), (edit.removed.get(2), 0));
+    assert_eq!((grid.get([0; 3]).weight, grid.get([10, 0, 0]).weight), (EDIT_LIMIT, 0));
+    assert_eq!((grid.get([12, 0, 0]).weight, grid.get([14, 0, 0]).weight), (-512, i16::MIN));
+}
+
+#[test]
+fn constructors_round_to_the_nearest_step() {
+    let shape = BrushShape::capsule([0.5, -0.5, 1.0 / 300.0], [-1.0 / 600.0, 7.0, 0.0], 1e-9).unwrap();
+    assert_eq!(shape, BrushShape::Capsule { a: [128, -128, 1], b: [0, 1792, 0], radius: 1 });
+    let stroke = Stroke::new(7, 1.5, 0.0, Duration::from_nanos(1999), Duration::MAX).unwrap();
+    assert_eq!(stroke, Stroke { id: 7, rate: 384, falloff: 0, start_us: 1, end_us: u64::MAX });
+}
+
+#[test]
+fn constructors_refuse_bad_numbers_in_a_sentence() {
+    let origin = [0.0; 3];
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, -1.0, 1024.1] {
+        assert!(matches!(BrushShape::sphere(origin, bad), Err(BrushError::Size { name: "radius", .. })), "{bad}");
+        assert!(matches!(BrushShape::capsule(origin, origin, bad), Err(BrushError::Size { name: "radius", .. })));
+        let found = BrushShape::cuboid(origin, [1.0, bad, 1.0]);
+        assert!(matches!(found, Err(BrushError::Size { name: "half size", .. })));
+    }
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1.1e9, -1.1e9] {
+        for position in [[bad, 0.0, 0.0], [0.0, 0.0, bad]] {
+            assert!(matches!(BrushShape::sphere(position, 1.0), Err(BrushError::Position { .. })), "{bad}");
+            assert!(matches!(BrushShape::cuboid(position, [1.0; 3]), Err(BrushError::Position { .. })));
+            assert!(matches!(BrushShape::capsule(origin, position, 1.0), Err(BrushError::Position { .. })));
+        }
+    }
+    for bad in [f64::NAN, f64::INFINITY, -1.0, 70_000.0] {
+        let (start, end) = (Duration::ZERO, Duration::from_secs(1));
+        assert!(matches!(Stroke::new(0, bad, 1.0, start, end), Err(BrushError::Rate { .. })), "{bad}");
+        assert!(matches!(Stroke::new(0, 1.0, bad, start, end), Err(BrushError::Falloff { .. })), "{bad}");
+        assert!(matches!(Stroke::new(0, 1.0, 1.0, end, start), Err(BrushError::Time { .. })));
+    }
+    let far = BrushShape::capsule(origin, [0.0, 0.0, 2049.0], 1.0).unwrap_err();
+    assert_eq!(far, BrushError::Length { found: 2049.0 });
+    assert_eq!(
+        BrushShape::sphere(origin, f64::NAN).unwrap_err().to_string(),
+        "a brush's radius must be above 0 and at most 1024 voxels, but it is NaN"
+    );
+    assert_eq!(
+        BrushShape::sphere([f64::INFINITY; 3], 1.0).unwrap_err().to_string(),
+        "a brush's coordinates must lie within ±1073741824 voxels of the origin, but one is inf"
+    );
+}
