@@ -1,0 +1,154 @@
+//! The mesher against a plain marching cubes that goes from cell to cell: the same triangles in the same order, of
+//! vertices in the same places.
+
+#[path = "support/fields.rs"]
+mod fields;
+
+use std::collections::HashMap;
+
+use fields::{Field, TestWeight};
+use marchless::{CaseIndex, MeshBuffer, MeshSettings, Mesher, Weight};
+use proptest::prelude::*;
+
+/// Where a vertex lies: on the edge from a meshed sample along an axis.
+type LatticeEdge = ([u32; 3], usize);
+
+struct OracleVertex {
+    edge: LatticeEdge,
+    fraction: f64,
+    /// Of any length.
+    normal: [f64; 3],
+    /// Whether the differences that make the normal cancel each other no more than the arithmetic can bear.
+    normal_is_sound: bool,
+    material: u8,
+}
+
+/// The plain marching cubes: every cell for itself, its vertices looked up by their edges.
+fn march<W: TestWeight>(field: &Field<W>) -> (Vec<OracleVertex>, Vec<u32>) {
+    let [nx, ny, nz] = field.meshed_size();
+    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+    let mut known: HashMap<LatticeEdge, u32> = HashMap::new();
+    for z in 0..nz - 1 {
+        for y in 0..ny - 1 {
+            for x in 0..nx - 1 {
+                let at = |corner: u32| [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
+                let case = (0..8).filter(|&corner| is_inside(field, at(corner))).map(|corner| 1 << corner).sum();
+                for edge in CaseIndex(case).triangles().iter().flatten() {
+                    let key = (at(edge.corners()[0].index() as u32), edge.axis());
+                    let index = *known.entry(key).or_insert_with(|| {
+                        vertices.push(vertex(field, key));
+                        vertices.len() as u32 - 1
+                    });
+                    indices.push(index);
+                }
+            }
+        }
+    }
+    (vertices, indices)
+}
+
+fn vertex<W: TestWeight>(field: &Field<W>, edge: LatticeEdge) -> OracleVertex {
+    let (low, axis) = edge;
+    let mut high = low;
+    high[axis] += 1;
+    let (a, b, isovalue) = (distance(field, low), distance(field, high), f64::from(field.isovalue));
+    let fraction = (isovalue - a) / (b - a);
+    // Both ends can be the same where one was infinite.
+    let fraction = if fraction.is_nan() { 0.0 } else { fraction }.clamp(1.0 / 1024.0, 1023.0 / 1024.0);
+    let (slope_a, slope_b) = (gradient(field, low), gradient(field, high));
+    let normal: [f64; 3] = core::array::from_fn(|k| slope_a[k] + (slope_b[k] - slope_a[k]) * fraction);
+    let largest = |v: &[f64]| v.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
+    let normal_is_sound = largest(&normal) > 0.01 * largest(&[slope_a, slope_b].concat());
+    let inside = if is_inside(field, low) { low } else { high };
+    OracleVertex { edge, fraction, normal, normal_is_sound, material: field.materials[index(field, inside, [0; 3])] }
+}
+
+/// The central difference, or the one-sided one at a border without padding.
+fn gradient<W: TestWeight>(field: &Field<W>, at: [u32; 3]) -> [f64; 3] {
+    core::array::from_fn(|axis| {
+        let mut step = [0; 3];
+        step[axis] = 1;
+        let below = if field.padded || at[axis] > 0 { step.map(|s| -s) } else { [0; 3] };
+        let above = if field.padded || at[axis] + 1 < field.meshed_size()[axis] { step } else { [0; 3] };
+        let [low, high] = [below, above].map(|step| finite(field.weights[index(field, at, step)]));
+        (high - low) / f64::from(above[axis] - below[axis])
+    })
+}
+
+fn is_inside<W: TestWeight>(field: &Field<W>, at: [u32; 3]) -> bool {
+    field.weights[index(field, at, [0; 3])].to_voxels() < field.isovalue
+}
+
+fn distance<W: TestWeight>(field: &Field<W>, at: [u32; 3]) -> f64 {
+    finite(field.weights[index(field, at, [0; 3])])
+}
+
+/// In voxels; NaN is outside, and nothing lies beyond what `f32` can say.
+fn finite<W: Weight>(weight: W) -> f64 {
+    let distance = f64::from(weight.to_voxels());
+    if distance.is_nan() { f32::MAX.into() } else { distance.clamp(f32::MIN.into(), f32::MAX.into()) }
+}
+
+fn index<W: TestWeight>(field: &Field<W>, at: [u32; 3], step: [i32; 3]) -> usize {
+    let padding = i32::from(field.padded);
+    field.shape.index(core::array::from_fn(|axis| (at[axis] as i32 + step[axis] + padding) as u32))
+}
+
+/// The edge that a vertex of the mesher lies on, and how far along: clamped crossings never reach a lattice point.
+fn edge_of(position: [f32; 3]) -> (LatticeEdge, f64) {
+    let axis = (0..3).find(|&axis| position[axis].fract() != 0.0).expect("a vertex is no lattice point");
+    assert!((0..3).all(|other| other == axis || position[other].fract() == 0.0), "{position:?} is on no edge");
+    ((position.map(|v| v as u32), axis), f64::from(position[axis].fract()))
+}
+
+fn compare<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
+    let (vertices, indices) = march(field);
+    let mut mesh = MeshBuffer::new();
+    // A mesher and a buffer that have seen other samples must not remember them.
+    let mut mesher = Mesher::new();
+    let turned_over = MeshSettings { isovalue: -field.isovalue, normals: false };
+    mesher.mesh(field.samples(), &turned_over, &mut mesh)?;
+    mesher.mesh(field.samples(), &MeshSettings { isovalue: field.isovalue, normals: true }, &mut mesh)?;
+
+    prop_assert_eq!(mesh.positions.len(), vertices.len());
+    prop_assert_eq!((mesh.normals.len(), mesh.materials.len()), (vertices.len(), vertices.len()));
+    prop_assert_eq!(mesh.indices.len(), indices.len());
+    for (&ours, &oracle) in mesh.indices.iter().zip(&indices) {
+        let (ours, oracle) = (ours as usize, &vertices[oracle as usize]);
+        let (edge, fraction) = edge_of(mesh.positions[ours]);
+        prop_assert_eq!(edge, oracle.edge);
+        // One rounding of a position of up to 131.
+        prop_assert!((fraction - oracle.fraction).abs() < 1e-5, "{:?}: {} for {}", edge, fraction, oracle.fraction);
+        prop_assert_eq!(mesh.materials[ours], oracle.material);
+        if oracle.normal_is_sound {
+            let length = oracle.normal.iter().map(|v| v * v).sum::<f64>().sqrt();
+            for axis in 0..3 {
+                let difference = f64::from(mesh.normals[ours][axis]) - oracle.normal[axis] / length;
+                prop_assert!(difference.abs() < 1e-3, "{:?} for {:?}", mesh.normals[ours], oracle.normal);
+            }
+        }
+    }
+    let bounds = mesh.positions.iter().fold(None, |bounds: Option<[[f32; 3]; 2]>, &p| {
+        let [min, max] = bounds.unwrap_or([p, p]);
+        Some([[0, 1, 2].map(|k| min[k].min(p[k])), [0, 1, 2].map(|k| max[k].max(p[k]))])
+    });
+    prop_assert_eq!(mesh.bounds, bounds);
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn fields_of_i8_equal_the_plain_ones(field in Field::<i8>::any()) {
+        compare(&field)?;
+    }
+
+    #[test]
+    fn fields_of_i16_equal_the_plain_ones(field in Field::<i16>::any()) {
+        compare(&field)?;
+    }
+
+    #[test]
+    fn fields_of_f32_equal_the_plain_ones(field in Field::<f32>::any()) {
+        compare(&field)?;
+    }
+}

@@ -1,0 +1,212 @@
+//! Chunks' meshes fit: equal vertices on every shared border, bit for bit, and closed together.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Debug;
+
+use marchless::{
+    Block, Chunk, ChunkSamples, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Voxel, Weight,
+};
+use proptest::prelude::*;
+
+/// How the samples of a random grid are made.
+#[derive(Clone, Copy, Debug)]
+enum Field {
+    /// Any bit pattern at every point.
+    Noise,
+    /// Few values near the isovalue, ties included.
+    Steps,
+    /// A wavy distance.
+    Smooth,
+    /// Whole chunks inside or outside.
+    Uniform,
+}
+
+trait Random: Weight + Debug {
+    fn random(bits: u64) -> Self;
+}
+
+impl Random for i8 {
+    fn random(bits: u64) -> Self {
+        bits as i8
+    }
+}
+
+impl Random for i16 {
+    fn random(bits: u64) -> Self {
+        bits as i16
+    }
+}
+
+impl Random for f32 {
+    fn random(bits: u64) -> Self {
+        f32::from_bits(bits as u32)
+    }
+}
+
+fn hash(seed: u64, point: [i32; 3]) -> u64 {
+    point.iter().fold(seed, |hash, &v| {
+        let mixed = (hash ^ v as u32 as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) ^ mixed >> 32
+    })
+}
+
+fn chunk<W: Random>(field: Field, seed: u64, region: Region) -> Chunk<W> {
+    let weight = |point: [i32; 3]| {
+        let bits = hash(seed, point);
+        let [x, y, z] = point.map(|v| v as f32);
+        let scale = 1.0 + (seed % 7) as f32;
+        match field {
+            Field::Noise => W::random(bits),
+            Field::Steps => W::from_voxels((bits % 5) as f32 / 4.0 - 0.5),
+            _ => W::from_voxels((x / scale).sin() * 3.0 + (y / 3.0).cos() * 2.0 + (z / (scale + 1.0)).sin() * 3.0),
+        }
+    };
+    if let Field::Uniform = field {
+        let inside = hash(seed, region.min) % 3 != 0;
+        return Chunk::Uniform(Voxel::new(if inside { W::INSIDE } else { W::OUTSIDE }, inside as u8));
+    }
+    let weights = region.points().map(weight).collect();
+    let materials = region.points().map(|point| (hash(seed, point) >> 40) as u8).collect();
+    Chunk::Samples(ChunkSamples { weights, materials }.into())
+}
+
+fn grid<W: Random>(field: Field, seed: u64, cells: u32, bounds: Region) -> Grid<W> {
+    let mut grid = Grid::bounded(cells, bounds).expect("a sound size");
+    for position in bounds.points() {
+        // Some chunks are absent, and some whole ones stand between sampled ones.
+        let field = if hash(seed, position) % 5 == 1 { Field::Uniform } else { field };
+        if hash(seed, position) % 7 != 2 {
+            grid.insert(position, chunk(field, seed, grid.chunk_region(position))).expect("within the bounds");
+        }
+    }
+    grid
+}
+
+/// A vertex in lattice space, exactly: `f64` holds the sum of a chunk's origin and an `f32` within the chunk.
+type Key = [u64; 3];
+
+fn key(origin: [i32; 3], position: [f32; 3]) -> Key {
+    // Adding 0.0 turns −0.0, which is the same place as 0.0, into it.
+    std::array::from_fn(|axis| (f64::from(origin[axis]) + f64::from(position[axis]) + 0.0).to_bits())
+}
+
+fn meshes<W: Random>(grid: &Grid<W>, settings: &MeshSettings) -> BTreeMap<[i32; 3], MeshBuffer> {
+    let (mut mesher, mut block) = (Mesher::new(), Block::new());
+    let mesh = |position| {
+        let mut mesh = MeshBuffer::new();
+        grid.neighbourhood(position).mesh(&mut mesher, &mut block, settings, &mut mesh).expect("sound settings");
+        (position, mesh)
+    };
+    grid.bounds().expect("a bounded grid").points().map(mesh).collect()
+}
+
+/// The vertices of a chunk's mesh that lie on the border it shares with another chunk: normal and material by place.
+fn border<W: Weight>(
+    grid: &Grid<W>,
+    mesh: &MeshBuffer,
+    own: [i32; 3],
+    other: [i32; 3],
+) -> BTreeMap<Key, ([u32; 3], u8)> {
+    let origin = grid.chunk_region(own).min;
+    let box_of_other = grid.chunk_region(other);
+    let on_border = |position: &[f32; 3]| {
+        (0..3).all(|axis| {
+            let coordinate = f64::from(origin[axis]) + f64::from(position[axis]);
+            (f64::from(box_of_other.min[axis])..=f64::from(box_of_other.max[axis])).contains(&coordinate)
+        })
+    };
+    let vertices = mesh.positions.iter().zip(&mesh.normals).zip(&mesh.materials);
+    vertices
+        .filter(|((position, _), _)| on_border(position))
+        .map(|((position, normal), material)| (key(origin, *position), (normal.map(f32::to_bits), *material)))
+        .collect()
+}
+
+fn check_seams<W: Random>(
+    field: Field,
+    seed: u64,
+    cells: u32,
+    bounds: Region,
+    isovalue: f32,
+) -> Result<(), TestCaseError> {
+    let grid = grid::<W>(field, seed, cells, bounds);
+    let settings = MeshSettings { isovalue, normals: true };
+    let meshes = meshes(&grid, &settings);
+
+    for (&position, mesh) in &meshes {
+        // Half of the 26 neighbours: the other half sees this chunk as one of theirs.
+        for neighbour in Region::new(position, position).grown(1, 2).points().filter(|&other| other > position) {
+            if let Some(other) = meshes.get(&neighbour) {
+                let ours = border(&grid, mesh, position, neighbour);
+                let theirs = border(&grid, other, neighbour, position);
+                prop_assert_eq!(ours, theirs, "between {:?} and {:?}", position, neighbour);
+            }
+        }
+    }
+
+    let mut welded = HashMap::new();
+    let mut positions = Vec::new();
+    let mut indices = Vec::new();
+    for (&position, mesh) in &meshes {
+        let origin = grid.chunk_region(position).min;
+        let ids: Vec<u32> = mesh
+            .positions
+            .iter()
+            .map(|&vertex| {
+                *welded.entry(key(origin, vertex)).or_insert_with(|| {
+                    positions.push(std::array::from_fn(|axis| origin[axis] as f32 + vertex[axis]));
+                    positions.len() as u32 - 1
+                })
+            })
+            .collect();
+        indices.extend(mesh.indices.iter().map(|&index| ids[index as usize]));
+    }
+    let report = MeshReport::new(&positions, &indices);
+    prop_assert_eq!(report.boundary_edges, 0, "{}", report);
+    prop_assert_eq!((report.non_manifold_edges, report.non_manifold_vertices), (0, 0), "{}", report);
+    prop_assert_eq!((report.inconsistent_edges, report.duplicate_triangles), (0, 0), "{}", report);
+    prop_assert_eq!(report.is_closed(), true, "{}", report);
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn borders_are_equal_and_the_union_is_closed(
+        field in prop_oneof![Just(Field::Noise), Just(Field::Steps), Just(Field::Smooth), Just(Field::Uniform)],
+        seed: u64,
+        cells in 8u32..=13,
+        min in [-3..3i32, -3..3, -3..3],
+        size in [1..=3i32, 1..=3, 1..=2],
+        isovalue in prop_oneof![3 => Just(0.0f32), 1 => -3.0..0.5f32],
+    ) {
+        let bounds = Region::new(min, std::array::from_fn(|axis| min[axis] + size[axis]));
+        check_seams::<i8>(field, seed, cells, bounds, isovalue)?;
+        check_seams::<i16>(field, seed, cells, bounds, isovalue)?;
+        check_seams::<f32>(field, seed, cells, bounds, isovalue)?;
+    }
+}
+
+#[test]
+fn a_full_grid_is_a_box_half_a_voxel_inside() {
+    let bounds = Region::new([-1, 0, 2], [1, 1, 3]);
+    let mut grid = Grid::<i16>::bounded(8, bounds).expect("a sound size");
+    for position in bounds.points() {
+        grid.insert(position, Chunk::Uniform(Voxel::new(i16::MIN, 1))).expect("within the bounds");
+    }
+    let meshes = meshes(&grid, &MeshSettings::default());
+    let mut ends = [[f64::MAX; 3], [f64::MIN; 3]];
+    for (position, mesh) in &meshes {
+        let origin = grid.chunk_region(*position).min;
+        for vertex in &mesh.positions {
+            for axis in 0..3 {
+                let coordinate = f64::from(origin[axis]) + f64::from(vertex[axis]);
+                ends[0][axis] = ends[0][axis].min(coordinate);
+                ends[1][axis] = ends[1][axis].max(coordinate);
+            }
+        }
+        assert!(mesh.materials.iter().all(|&material| material == 1));
+    }
+    assert_eq!(ends, [[-7.5, 0.5, 16.5], [7.5, 7.5, 23.5]]);
+}

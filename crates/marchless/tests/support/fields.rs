@@ -1,0 +1,102 @@
+//! Random fields for property tests: shapes, weights, isovalues and padding of all kinds.
+
+use marchless::{Samples, Shape, Weight};
+use proptest::{collection::vec, prelude::*, sample::select};
+
+/// Samples to be meshed, and how.
+#[derive(Clone, Debug)]
+pub(crate) struct Field<W> {
+    pub(crate) shape: Shape,
+    pub(crate) weights: Vec<W>,
+    pub(crate) materials: Vec<u8>,
+    pub(crate) padded: bool,
+    pub(crate) isovalue: f32,
+}
+
+impl<W: TestWeight> Field<W> {
+    /// Any field: white noise of a few or of all weights, sparse or dense.
+    pub(crate) fn any() -> impl Strategy<Value = Self> {
+        (sizes(), any::<bool>(), 0..4usize).prop_flat_map(|(size, padded, kind)| {
+            let shape = Shape::new(size.map(|n| n + 2 * u32::from(padded))).expect("the sizes are small");
+            let weight = match kind {
+                0 => select(W::NEAR_ZERO).boxed(),
+                1 => prop_oneof![9 => Just(W::OUTSIDE), 1 => select(W::NEAR_ZERO)].boxed(),
+                2 => prop_oneof![3 => W::all(), 1 => select(W::EXTREMES)].boxed(),
+                _ => prop_oneof![9 => select(W::NEAR_ZERO), 1 => select(W::EXTREMES)].boxed(),
+            };
+            let isovalue = prop_oneof![
+                Just(0.0f32),
+                select(W::NEAR_ZERO).prop_map(W::to_voxels),
+                -2.0f32..2.0,
+                W::all().prop_map(W::to_voxels),
+                select(vec![f32::MIN, f32::MAX, 1e-40]),
+            ];
+            (vec(weight, shape.len()), vec(0..4u8, shape.len()), isovalue).prop_map(
+                move |(weights, materials, isovalue)| Self {
+                    shape,
+                    weights,
+                    materials,
+                    padded,
+                    isovalue: if isovalue.is_finite() { isovalue } else { 0.0 },
+                },
+            )
+        })
+    }
+
+    pub(crate) fn samples(&self) -> Samples<'_, W> {
+        let samples = Samples::new(self.shape, &self.weights).expect("one weight a sample");
+        let samples = samples.with_materials(&self.materials).expect("one material a sample");
+        if self.padded { samples.padded() } else { samples }
+    }
+
+    /// Meshed samples per axis.
+    pub(crate) fn meshed_size(&self) -> [u32; 3] {
+        self.shape.size().map(|n| n - 2 * u32::from(self.padded))
+    }
+}
+
+/// Meshed samples per axis: rows of less than a word, of about a word and of about two, the other axes short.
+fn sizes() -> impl Strategy<Value = [u32; 3]> {
+    let row = prop_oneof![4 => 2..8u32, 1 => 62..68u32, 1 => 126..131u32];
+    (row, 2..6u32, 2..6u32, 0..3usize).prop_map(|(long, a, b, turn)| {
+        let mut size = [long, a, b];
+        size.rotate_right(turn);
+        size
+    })
+}
+
+/// Weights worth testing.
+pub(crate) trait TestWeight: Weight {
+    /// Such that signs alternate, and some equal an isovalue.
+    const NEAR_ZERO: &'static [Self];
+    const EXTREMES: &'static [Self];
+    fn all() -> BoxedStrategy<Self>;
+}
+
+impl TestWeight for i8 {
+    const NEAR_ZERO: &'static [Self] = &[-40, -2, -1, 0, 1, 2, 40];
+    const EXTREMES: &'static [Self] = &[Self::MIN, Self::MAX];
+
+    fn all() -> BoxedStrategy<Self> {
+        any::<Self>().boxed()
+    }
+}
+
+impl TestWeight for i16 {
+    const NEAR_ZERO: &'static [Self] = &[-300, -2, -1, 0, 1, 2, 300];
+    const EXTREMES: &'static [Self] = &[Self::MIN, Self::MAX];
+
+    fn all() -> BoxedStrategy<Self> {
+        any::<Self>().boxed()
+    }
+}
+
+impl TestWeight for f32 {
+    const NEAR_ZERO: &'static [Self] = &[-1.5, -0.5, -0.0, 0.0, 0.25, 1.0];
+    const EXTREMES: &'static [Self] =
+        &[Self::NAN, Self::INFINITY, Self::NEG_INFINITY, Self::MIN, Self::MAX, 1e-42, -1e-42, 1e20, -1e20];
+
+    fn all() -> BoxedStrategy<Self> {
+        proptest::num::f32::ANY.boxed()
+    }
+}
