@@ -13,7 +13,9 @@ use thiserror::Error;
 pub use self::block::{Block, Neighbourhood};
 use self::border::Border;
 pub use self::chunk::{Chunk, ChunkSamples};
+use crate::buffer::MeshBuffer;
 use crate::lattice::Region;
+use crate::mesher::{MeshError, MeshSettings, Mesher};
 use crate::sample::{Voxel, Weight};
 
 /// Cells per axis of a chunk where nothing else is asked for.
@@ -220,6 +222,21 @@ impl<W: Weight> Grid<W> {
     /// The chunks whose meshes are out of date; from now on, none are.
     pub fn take_dirty(&mut self) -> BTreeSet<[i32; 3]> {
         core::mem::take(&mut self.dirty)
+    }
+
+    /// Meshes the chunk at `position`, in cells from its lowest lattice point. Many chunks are meshed faster by
+    /// [`Neighbourhood::mesh`], which reuses its block.
+    ///
+    /// # Errors
+    /// As [`Mesher::mesh`]; `out` is then empty.
+    pub fn mesh_chunk(
+        &self,
+        position: [i32; 3],
+        mesher: &mut Mesher,
+        settings: &MeshSettings,
+        out: &mut MeshBuffer,
+    ) -> Result<(), MeshError> {
+        self.neighbourhood(position).mesh(mesher, &mut Block::new(), settings, out)
     }
 
     /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who clips it to the

@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 
 use super::Chunk;
 use super::border::Border;
+use crate::buffer::MeshBuffer;
 use crate::lattice::{Samples, Shape};
+use crate::mesher::{MeshError, MeshSettings, Mesher};
 use crate::sample::{Voxel, Weight};
 
 /// A chunk and its 26 neighbours as they are now: all that its mesh depends on, unaffected by later edits, to be
@@ -58,6 +60,26 @@ impl<W: Weight> Neighbourhood<W> {
                 None => fill(out, spans, |point| self.beyond(point)),
             }
         }
+    }
+
+    /// Meshes the chunk: positions are in cells from its lowest lattice point. `block` is scratch; in a uniform
+    /// neighbourhood it is left as it is, and `out` empty.
+    ///
+    /// # Errors
+    /// As [`Mesher::mesh`]; `out` is then empty.
+    pub fn mesh(
+        &self,
+        mesher: &mut Mesher,
+        block: &mut Block<W>,
+        settings: &MeshSettings,
+        out: &mut MeshBuffer,
+    ) -> Result<(), MeshError> {
+        if self.is_uniform() && settings.isovalue.is_finite() {
+            out.clear();
+            return Ok(());
+        }
+        self.block(block);
+        mesher.mesh(block.samples(), settings, out)
     }
 
     /// The voxel at a point of the block that lies beyond the bounds.

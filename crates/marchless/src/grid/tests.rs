@@ -1,1 +1,412 @@
-//! Tests of the grid against plain oracles.
+//! Tests of the grid against plain oracles: a map of voxels, and brute force.
+
+use alloc::boxed::Box;
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::source::{Bound, Source, SourceRegion};
+
+fn voxel() -> impl Strategy<Value = Voxel> {
+    (any::<i16>(), any::<u8>()).prop_map(|(weight, material)| Voxel { weight, material })
+}
+
+/// One of: absent, uniform (often air), samples.
+fn chunk(cells: u32) -> impl Strategy<Value = Option<Chunk>> {
+    let len = (cells as usize).pow(3);
+    prop_oneof![
+        2 => Just(None),
+        1 => Just(Some(Chunk::AIR)),
+        2 => voxel().prop_map(|voxel| Some(Chunk::Uniform(voxel))),
+        3 => any::<u64>().prop_map(move |seed| Some(noise_chunk(seed, len))),
+    ]
+}
+
+fn noise_chunk(seed: u64, len: usize) -> Chunk {
+    let mut state = seed | 1;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    let weights = (0..len).map(|_| next() as i16).collect();
+    let materials = (0..len).map(|_| next() as u8).collect();
+    Chunk::Samples(Arc::new(ChunkSamples { weights, materials }))
+}
+
+/// A grid of up to 3³ random chunks around `centre`, its bounds none, or a box of 1 to 5 chunks per axis around it.
+fn grid() -> impl Strategy<Value = (Grid, [i32; 3])> {
+    let cells = prop_oneof![Just(8u32), Just(9), Just(13)];
+    let end = (i32::MAX - 2) / 13 - 3;
+    let coordinate = move || prop_oneof![-3..=3i32, Just(end), Just(-end)];
+    let centre = [coordinate(), coordinate(), coordinate()];
+    let margins = proptest::option::of(([0..3i32, 0..3, 0..3], [1..3i32, 1..3, 1..3]));
+    (cells, centre, margins).prop_flat_map(|(cells, centre, margins)| {
+        proptest::collection::vec(chunk(cells), 27).prop_map(move |chunks| {
+            let mut grid = match margins {
+                None => Grid::new(cells),
+                Some((low, high)) => {
+                    let min = core::array::from_fn(|axis| centre[axis] - low[axis]);
+                    let max = core::array::from_fn(|axis| centre[axis] + high[axis]);
+                    Grid::bounded(cells, Region::new(min, max))
+                }
+            }
+            .unwrap();
+            for (position, chunk) in around(centre).points().zip(chunks) {
+                if let Some(chunk) = chunk {
+                    let fits = grid.bounds().is_none_or(|bounds| bounds.contains(position));
+                    assert_eq!(grid.insert(position, chunk).is_ok(), fits);
+                }
+            }
+            (grid, centre)
+        })
+    })
+}
+
+fn around(position: [i32; 3]) -> Region {
+    Region::new(position, position).grown(1, 2)
+}
+
+/// The lattice points that the chunk's mesh reads.
+fn block_region(position: [i32; 3], cells: u32) -> Region {
+    let n = cells as i32;
+    Region::new(position.map(|c| n * c - 1), position.map(|c| n * c + n + 2))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn what_is_set_is_got(
+        cells in 8u32..=62,
+        writes in proptest::collection::vec(([-130..130i32, -130..130, -130..130], voxel()), 1..60),
+    ) {
+        let mut grid = Grid::new(cells).unwrap();
+        let mut oracle = BTreeMap::new();
+        for &(point, voxel) in &writes {
+            grid.set(point, voxel).unwrap();
+            oracle.insert(point, voxel);
+        }
+        for (point, _) in writes {
+            for neighbour in around(point).points() {
+                let expected = oracle.get(&neighbour).copied().unwrap_or(Voxel::AIR);
+                prop_assert_eq!(grid.get(neighbour), expected);
+            }
+            prop_assert!(grid.chunk_region(grid.chunk_of(point)).contains(point));
+        }
+    }
+
+    #[test]
+    fn blocks_hold_what_get_reads((grid, centre) in grid(), step in [-1..=1i32, -1..=1, -1..=1]) {
+        let mut block = Block::new();
+        // An off-centre chunk has absent neighbours, and often lies beyond the bounds itself.
+        for position in [centre, core::array::from_fn(|axis| centre[axis] + step[axis])] {
+            grid.neighbourhood(position).block(&mut block);
+            let samples = block.samples();
+            let region = block_region(position, grid.chunk_cells());
+            prop_assert_eq!(samples.shape().size(), region.size());
+            prop_assert!(samples.is_padded());
+            for (index, point) in region.points().enumerate() {
+                let found = Voxel::new(samples.weights()[index], samples.materials().unwrap()[index]);
+                prop_assert_eq!(found, grid.get(point), "at {:?} of chunk {:?}", point, position);
+            }
+        }
+    }
+
+    #[test]
+    fn uniform_neighbourhoods_have_no_surface((grid, centre) in grid()) {
+        let mut emptied = grid.clone();
+        let sampled: Vec<_> =
+            grid.chunks().filter(|(_, chunk)| matches!(chunk, Chunk::Samples(_))).map(|(p, _)| p).collect();
+        for position in sampled {
+            emptied.remove(position);
+        }
+        for grid in [grid, emptied] {
+            for position in around(centre).points() {
+                let neighbourhood = grid.neighbourhood(position);
+                let mut block = Block::new();
+                neighbourhood.block(&mut block);
+                let weights = block.samples().weights();
+                let one_weight = weights.iter().all(|weight| *weight == weights[0]);
+                if neighbourhood.is_uniform() {
+                    for isovalue in [-3.0, 0.0, 0.5] {
+                        let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+                        let mut mesh = MeshBuffer::new();
+                        Mesher::new().mesh(block.samples(), &settings, &mut mesh).unwrap();
+                        prop_assert!(mesh.is_empty(), "at isovalue {}", isovalue);
+                    }
+                }
+                let whole = neighbourhood.chunks.iter().all(|chunk| matches!(chunk, Some(Chunk::Uniform(_))));
+                prop_assert!(!(whole && one_weight) || neighbourhood.is_uniform());
+            }
+        }
+    }
+
+    #[test]
+    fn inserting_clips_as_setting_does((grid, _) in grid()) {
+        if let Some(bounds) = grid.bounds() {
+            for position in bounds.points().take(8) {
+                let chunk = noise_chunk(position[0] as u64 ^ 77, (grid.chunk_cells() as usize).pow(3));
+                let (mut inserted, mut set) = (grid.clone(), grid.clone());
+                inserted.insert(position, chunk.clone()).unwrap();
+                for (index, point) in grid.chunk_region(position).points().enumerate() {
+                    set.set(point, chunk.voxel(index)).unwrap();
+                }
+                prop_assert_eq!(inserted.chunk(position), set.chunk(position));
+            }
+        }
+    }
+
+    #[test]
+    fn bounded_grids_keep_their_walls((grid, centre) in grid(), chunk_voxel in voxel()) {
+        let mut grid = grid;
+        let Some(planes) = grid.planes() else { return Ok(()) };
+        grid.insert(centre, Chunk::Uniform(chunk_voxel)).unwrap();
+        for point in grid.chunk_region(centre).points() {
+            let depth = (0..3).map(|axis| (point[axis] - planes.min[axis]).min(planes.max[axis] - point[axis]));
+            let depth = depth.min().unwrap();
+            let least = if depth <= 4 { 128 - 256 * depth as i16 } else { i16::MIN };
+            prop_assert_eq!(grid.get(point).weight, chunk_voxel.weight.max(least));
+            prop_assert_eq!(grid.get(point).material, chunk_voxel.material);
+        }
+    }
+
+    #[test]
+    fn affected_chunks_are_those_whose_block_changes(
+        cells in 8u32..=62,
+        min in [-200..200i32, -200..200, -200..200],
+        size in [0..70i32, 0..70, 0..3],
+        bounds in proptest::option::of(([-4..4i32, -4..4, -4..4], [1..9i32, 1..9, 1..9])),
+    ) {
+        let changed = Region::new(min, core::array::from_fn(|axis| min[axis] + size[axis]));
+        let grid = match bounds {
+            None => Grid::<i16>::new(cells),
+            Some((low, size)) => {
+                Grid::bounded(cells, Region::new(low, core::array::from_fn(|axis| low[axis] + size[axis])))
+            }
+        }
+        .unwrap();
+        let affected = grid.chunks_affected_by(changed);
+        let within = grid.bounds().unwrap_or(Region::new([i32::MIN; 3], [i32::MAX; 3]));
+        let mut found = 0;
+        for position in Region::new(grid.chunk_of(min), grid.chunk_of(changed.max)).grown(2, 3).points() {
+            let reads = !changed.is_empty() && !block_region(position, cells).intersection(&changed).is_empty();
+            prop_assert_eq!(affected.contains(position), reads && within.contains(position), "{:?}", position);
+            found += u32::from(affected.contains(position));
+        }
+        prop_assert_eq!(affected.size().iter().product::<u32>(), found, "some lie elsewhere");
+    }
+
+    #[test]
+    fn setting_marks_the_chunks_that_read_the_point((grid, centre) in grid(), offset in [0..13i32, 0..13, 0..13]) {
+        let mut grid = grid;
+        let cells = grid.chunk_cells() as i32;
+        let point = core::array::from_fn(|axis| centre[axis] * cells + offset[axis] % cells);
+        grid.take_dirty();
+        let old = grid.get(point);
+        grid.set(point, old).unwrap();
+        prop_assert!(grid.dirty().is_empty(), "nothing changed");
+        grid.set(point, Voxel::new(old.weight, old.material ^ 1)).unwrap();
+        let expected: BTreeSet<_> = around(centre)
+            .points()
+            .filter(|&position| block_region(position, cells as u32).contains(point))
+            .filter(|&position| grid.bounds().is_none_or(|bounds| bounds.contains(position)))
+            .collect();
+        prop_assert_eq!(grid.take_dirty(), expected);
+    }
+}
+
+#[test]
+fn every_write_of_a_clone_leaves_the_original_alone() {
+    let mut grid = Grid::<i16>::new(8).unwrap();
+    grid.insert([0; 3], noise_chunk(5, 512)).unwrap();
+    grid.insert([1, 0, 0], Chunk::Uniform(Voxel::new(-300, 2))).unwrap();
+    let original = grid.clone();
+    let snapshot = grid.neighbourhood([0; 3]);
+    let samples = |grid: &Grid| -> Vec<_> { Region::new([-8; 3], [24; 3]).points().map(|p| grid.get(p)).collect() };
+    let before = samples(&original);
+    let mut block_before = Block::new();
+    snapshot.block(&mut block_before);
+
+    grid.set([3, 3, 3], Voxel::new(9, 9)).unwrap();
+    grid.set([9, 3, 3], Voxel::new(9, 9)).unwrap();
+    grid.remove([1, 0, 0]);
+    grid.insert([0, 1, 0], Chunk::Uniform(Voxel::new(-1, 1))).unwrap();
+
+    assert_ne!(samples(&grid), before);
+    assert_eq!(samples(&original), before);
+    let mut block = Block::new();
+    snapshot.block(&mut block);
+    assert_eq!(block.samples().weights(), block_before.samples().weights());
+    assert_eq!(grid.get([9, 3, 3]), Voxel::AIR, "a removed chunk reads as air");
+}
+
+#[test]
+fn reading_and_clipping_copy_nothing() {
+    let mut grid = Grid::<i16>::bounded(8, Region::new([0; 3], [1; 3])).unwrap();
+    let shared = Arc::new(ChunkSamples { weights: (0..512).map(|i| 1000 + i).collect(), materials: vec![0; 512] });
+    grid.insert([0; 3], Chunk::Samples(Arc::clone(&shared))).unwrap();
+    let clone = grid.clone();
+    assert!(
+        matches!(clone.chunk([0; 3]), Some(Chunk::Samples(kept)) if Arc::ptr_eq(kept, &shared)),
+        "outside of the walls already"
+    );
+    grid.set([1, 2, 3], Voxel::new(0, 0)).unwrap();
+    assert!(matches!(grid.chunk([0; 3]), Some(Chunk::Samples(kept)) if !Arc::ptr_eq(kept, &shared)));
+    grid.insert([0; 3], Chunk::AIR).unwrap();
+    assert_eq!(grid.chunk([0; 3]), Some(&Chunk::AIR), "air needs no samples at the border");
+}
+
+#[test]
+fn errors_say_what_was_expected() {
+    for found in [0, 7, 63, u32::MAX] {
+        assert_eq!(Grid::<i16>::new(found).unwrap_err(), GridError::ChunkCells { found });
+        assert_eq!(Chunk::<i16>::from_samples(vec![], vec![], found).unwrap_err(), GridError::ChunkCells { found });
+    }
+    let error = Chunk::from_samples(vec![0i16; 512], vec![0; 511], 8).unwrap_err();
+    assert_eq!(error, GridError::SamplesLength { cells: 8, expected: 512, weights: 512, materials: 511 });
+
+    let bounds = Region::new([0; 3], [2, 1, 1]);
+    let mut grid = Grid::<i16>::bounded(8, bounds).unwrap();
+    for point in [[-1, 0, 0], [16, 0, 0], [0, 8, 0], [0, 0, i32::MIN]] {
+        let position = grid.chunk_of(point);
+        assert_eq!(grid.set(point, Voxel::AIR), Err(GridError::OutOfBounds { position, bounds }));
+    }
+    let error = grid.insert([0; 3], noise_chunk(1, 729)).unwrap_err();
+    assert_eq!(error, GridError::SamplesLength { cells: 8, expected: 512, weights: 729, materials: 729 });
+    assert!(grid.insert([2, 0, 0], Chunk::AIR).is_err());
+    assert!(grid.dirty().is_empty() && grid.chunks().next().is_none(), "refused writes change nothing");
+
+    for bounds in
+        [Region::new([0; 3], [1, 0, 1]), Region::new([i32::MIN; 3], [0; 3]), Region::new([0; 3], [i32::MAX; 3])]
+    {
+        assert!(matches!(Grid::<i16>::bounded(8, bounds), Err(GridError::Bounds { .. })));
+    }
+}
+
+#[test]
+fn the_ends_of_the_lattice_are_reached_without_panic() {
+    let ends = [i32::MIN, i32::MIN + 1, -1, 0, i32::MAX - 1, i32::MAX];
+    let mut block = Block::new();
+    for cells in [8, 31, 62] {
+        let limit = (i32::MAX - 2) / cells as i32;
+        let bounds = Region::new([-limit; 3], [limit; 3]);
+        for mut grid in [Grid::<i16>::new(cells).unwrap(), Grid::bounded(cells, bounds).unwrap()] {
+            for (a, b) in ends.into_iter().flat_map(|a| ends.map(|b| (a, b))) {
+                let point = [a, b, a];
+                let stored = grid.set(point, Voxel::new(-1, 3)).is_ok();
+                assert_eq!(stored, bounds.contains(grid.chunk_of(point)));
+                assert_eq!(grid.get(point).material == 3, stored);
+                let _ = (grid.chunks_affected_by(Region::new(point, [b, a, b])), grid.chunk_region(point));
+                assert_eq!(grid.insert(point, Chunk::AIR).is_ok(), bounds.contains(point));
+                grid.neighbourhood(point).block(&mut block);
+                let _ = Chunk::<i16>::from_source(&|_| f64::NAN, point, cells, 1.0);
+            }
+            grid.take_dirty();
+            grid.mark_dirty(Region::new([i32::MIN; 3], [i32::MAX; 3]));
+            assert!(grid.chunks().all(|(position, _)| grid.dirty().contains(&position)));
+            for position in [[limit - 1, 0, 0], [-limit, 0, 0]] {
+                grid.neighbourhood(position).block(&mut block);
+                for (index, point) in block_region(position, cells).points().enumerate() {
+                    assert_eq!(block.samples().weights()[index], grid.get(point).weight);
+                }
+            }
+        }
+    }
+}
+
+/// A ball of stone with a hollow, which knows its bounds.
+#[derive(Clone, Copy)]
+struct Shell {
+    centre: [f64; 3],
+    radius: f64,
+    bounds: bool,
+}
+
+impl Shell {
+    fn distance(&self, point: [f64; 3]) -> f64 {
+        let square = |axis: usize| (point[axis] - self.centre[axis]) * (point[axis] - self.centre[axis]);
+        let away = libm::sqrt(square(0) + square(1) + square(2));
+        (away - self.radius).max(3.0 - away)
+    }
+}
+
+impl Source for Shell {
+    fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+        let size = Region::new([0; 3], region.size.map(|v| v as i32));
+        for (index, point) in size.points().enumerate() {
+            distances[index] = (self.distance(region.position(point.map(|v| v as u32))) / region.spacing) as f32;
+            materials[index] = 4;
+        }
+    }
+
+    fn bound(&self, region: &SourceRegion) -> Bound {
+        let [low, high] = [region.position([0; 3]), region.position(region.size.map(|v| v - 1))];
+        let middle = core::array::from_fn(|axis| (low[axis] + high[axis]) / 2.0);
+        let reach = libm::sqrt((0..3).map(|axis| (high[axis] - low[axis]) * (high[axis] - low[axis])).sum()) / 2.0;
+        match self.distance(middle) {
+            _ if !self.bounds => Bound::Mixed,
+            distance if distance > reach => Bound::Outside,
+            distance if distance < -reach => Bound::Inside { material: 4 },
+            _ => Bound::Mixed,
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn bounds_spare_samples_and_change_nothing(
+        cells in 8u32..=12,
+        centre in [-4.0..4.0f64, -4.0..4.0, -4.0..4.0],
+        radius in 8.0..60.0f64,
+        spacing in prop_oneof![Just(1.0), Just(0.5)],
+    ) {
+        let shell = Shell { centre, radius, bounds: true };
+        let mut spared = 0;
+        let mut grids = [Grid::<i16>::new(cells).unwrap(), Grid::new(cells).unwrap()];
+        for position in Region::new([-4; 3], [4; 3]).points() {
+            for (grid, bounds) in grids.iter_mut().zip([true, false]) {
+                let source: Box<dyn Source> = Box::new(Shell { bounds, ..shell });
+                grid.insert(position, Chunk::from_source(&source, position, cells, spacing)).unwrap();
+            }
+            spared += u32::from(matches!(grids[0].chunk(position), Some(Chunk::Uniform(_))));
+            for point in grids[0].chunk_region(position).points() {
+                let [fast, plain] = [&grids[0], &grids[1]].map(|grid| grid.get(point));
+                prop_assert_eq!(fast.weight < 0, plain.weight < 0);
+                prop_assert!(fast.weight == plain.weight || plain.weight.unsigned_abs() > 4 * 256);
+            }
+        }
+        prop_assert!(spared > 0);
+        let mut mesher = Mesher::new();
+        let mut meshes = [MeshBuffer::new(), MeshBuffer::new()];
+        for position in Region::new([-3; 3], [3; 3]).points() {
+            for isovalue in [0.0, 1.0, -1.0] {
+                let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+                for (grid, mesh) in grids.iter().zip(&mut meshes) {
+                    grid.mesh_chunk(position, &mut mesher, &settings, mesh).unwrap();
+                }
+                prop_assert_eq!(&meshes[0].positions, &meshes[1].positions);
+                prop_assert_eq!(&meshes[0].normals, &meshes[1].normals);
+                prop_assert_eq!(&meshes[0].indices, &meshes[1].indices);
+            }
+        }
+    }
+}
+
+#[test]
+fn chunks_of_one_voxel_are_uniform() {
+    let rock = |_: [f64; 3]| -1e9;
+    assert_eq!(Chunk::from_source(&rock, [1, 2, 3], 8, 1.0), Chunk::Uniform(Voxel::new(i16::MIN, 0)));
+    let mut weights = vec![5i16; 512];
+    assert_eq!(Chunk::from_samples(weights.clone(), vec![3; 512], 8), Ok(Chunk::Uniform(Voxel::new(5, 3))));
+    weights[511] = 6;
+    let chunk = Chunk::from_samples(weights, vec![3; 512], 8).unwrap();
+    assert_eq!((chunk.voxel(510).weight, chunk.voxel(511).weight, chunk.voxel(512)), (5, 6, Voxel::AIR));
+}
