@@ -99,8 +99,8 @@ impl HeightMap {
         samples: Vec<u16>,
         settings: HeightMapSettings,
     ) -> Result<Self, HeightMapError> {
-        let expected = size[0] as usize * size[1] as usize;
-        if samples.len() != expected {
+        let expected = u64::from(size[0]) * u64::from(size[1]);
+        if samples.len() as u64 != expected {
             return Err(HeightMapError::SampleCount { size, expected, found: samples.len() });
         }
         let (Some(&lowest), Some(&highest)) = (samples.iter().min(), samples.iter().max()) else {
@@ -288,7 +288,7 @@ pub enum HeightMapError {
         /// Samples along x and z.
         size: [u32; 2],
         /// Their product.
-        expected: usize,
+        expected: u64,
         /// How many there are.
         found: usize,
     },
