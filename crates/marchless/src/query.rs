@@ -1,1 +1,198 @@
-//! TODO
+//! Questions to a [`Grid`]: what a ray hits, and the weight anywhere.
+//!
+//! A ray walks from chunk to chunk, past those that are uniform, and from cell to cell in the others (John Amanatides and
+//! Andrew Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", 1987). In a cell that the surface crosses it
+//! is tested against the very triangles that the mesher makes of it.
+
+mod ray;
+#[cfg(test)]
+mod tests;
+
+use crate::{
+    cell::{CaseIndex, Corner, Edge},
+    grid::{Chunk, Grid},
+    lattice::Region,
+    mesher::crossing_fraction,
+    sample::{Voxel, Weight},
+};
+use ray::{Crossing, Ray};
+
+/// Where a ray hits the surface first; lengths and positions in lattice units (voxels).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// How far from the ray's origin.
+    pub distance: f64,
+    /// Where.
+    pub position: [f64; 3],
+    /// The normal of the triangle that was hit, of unit length, to the outside; which side was hit, the ray's direction tells.
+    pub normal: [f32; 3],
+    /// The material of the triangle's corner nearest to the hit.
+    pub material: u8,
+    /// The cell that holds the triangle: its lowest lattice point.
+    pub cell: [i32; 3],
+    /// The position of the chunk whose mesh holds the triangle.
+    pub chunk: [i32; 3],
+}
+
+/// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no ray.
+///
+/// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue. `origin`, `direction` and `max_distance` are in
+/// lattice units; the direction may have any length but 0, and the distance may be infinite. A ray along
+/// a triangle's plane or through its very edge may count as a hit or as a miss.
+///
+/// ```
+/// use marchless::{BrushShape, Grid, Operation, Stamp, ray_cast};
+///
+/// let mut grid = Grid::<i16>::new(32)?;
+/// grid.apply(&Stamp::new(BrushShape::sphere([0.0; 3], 10.0)?, Operation::Add, 1));
+/// let hit = ray_cast(&grid, 0.0, [30.0, 0.5, 0.5], [-1.0, 0.0, 0.0], 100.0).expect("the ball is in its way");
+/// assert!((hit.distance - 20.0).abs() < 0.1);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub fn ray_cast<W: Weight>(
+    grid: &Grid<W>,
+    isovalue: f32,
+    origin: [f64; 3],
+    direction: [f64; 3],
+    max_distance: f64,
+) -> Option<RayHit> {
+    if !isovalue.is_finite() {
+        return None;
+    }
+    let ray = Ray::new(origin, direction, max_distance)?;
+    let cells = i64::from(grid.chunk_cells());
+    for chunk in ray.walk(drawn_chunks(grid), cells) {
+        let surface = Surface::new(grid, chunk, isovalue);
+        if surface.is_empty() {
+            continue;
+        }
+        let hit = ray.walk(grid.chunk_region(chunk), 1).find_map(|cell| surface.hit(&ray, cell));
+        if hit.is_some() {
+            return hit;
+        }
+    }
+    None
+}
+
+/// The weight at any position, in voxels: trilinear between the eight lattice points around it. `None` where the position is not
+/// finite.
+///
+/// `position`: in lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles,
+/// which the trilinear surface only comes close to.
+pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
+    if !position.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let limits = (f64::from(i32::MIN), f64::from(i32::MAX - 1));
+    let position = position.map(|v| v.clamp(limits.0, limits.1));
+    let low = position.map(libm::floor);
+    let weight = Corner::ALL.iter().map(|corner| {
+        let offset = corner.offset();
+        let share = [0, 1, 2].map(|axis| {
+            let high = position[axis] - low[axis];
+            if offset[axis] == 1 { high } else { 1.0 - high }
+        });
+        let point = [0, 1, 2].map(|axis| low[axis] as i32 + i32::from(offset[axis]));
+        share[0] * share[1] * share[2] * f64::from(grid.get(point).weight.to_voxels())
+    });
+    Some(weight.sum::<f64>() as f32)
+}
+
+/// A box around the chunk positions that have a mesh.
+fn drawn_chunks<W: Weight>(grid: &Grid<W>) -> Region {
+    grid.bounds().unwrap_or_else(|| {
+        let regions = grid.chunks().map(|(position, _)| grid.chunk_region(position));
+        let present = regions.reduce(|all, region| all.union(&region)).unwrap_or(Region::new([0; 3], [0; 3]));
+        grid.chunks_affected_by(present)
+    })
+}
+
+/// The triangles of one chunk.
+struct Surface<W: Weight> {
+    position: [i32; 3],
+    /// The chunk's lowest lattice point.
+    origin: [i32; 3],
+    /// The chunk and its neighbours on the high sides: bit 0 of the index is x, bit 1 y, bit 2 z.
+    chunks: [Chunk<W>; 8],
+    /// Cells per axis.
+    cells: i32,
+    isovalue: f32,
+}
+
+impl<W: Weight> Surface<W> {
+    fn new(grid: &Grid<W>, position: [i32; 3], isovalue: f32) -> Self {
+        let chunks = Corner::ALL.map(|corner| {
+            let offset = corner.offset();
+            let position = [0, 1, 2].map(|axis| position[axis].saturating_add(offset[axis].into()));
+            // Beyond the bounds, all that a chunk's cells read lies on the outermost planes and is the same.
+            let absent = || Chunk::Uniform(grid.get(grid.chunk_region(position).min));
+            grid.chunk(position).cloned().unwrap_or_else(absent)
+        });
+        let origin = grid.chunk_region(position).min;
+        Self { position, origin, chunks, cells: grid.chunk_cells() as i32, isovalue }
+    }
+
+    /// Whether it is certain, without looking at single samples, that there are none.
+    fn is_empty(&self) -> bool {
+        let threshold = W::threshold(self.isovalue);
+        let inside = |chunk: &Chunk<W>| match chunk {
+            Chunk::Uniform(voxel) => Some(voxel.weight.inside(threshold)),
+            Chunk::Samples(_) => None,
+        };
+        let first = inside(&self.chunks[0]);
+        first.is_some() && self.chunks.iter().all(|chunk| inside(chunk) == first)
+    }
+
+    /// The nearest hit in `cell`.
+    fn hit(&self, ray: &Ray, cell: [i32; 3]) -> Option<RayHit> {
+        let local = [0, 1, 2].map(|axis| cell[axis] - self.origin[axis]);
+        let corners = Corner::ALL.map(|corner| self.voxel(local, corner));
+        let threshold = W::threshold(self.isovalue);
+        let case = (0..8).fold(0, |case, i| case | u8::from(corners[i].weight.inside(threshold)) << i);
+        let mut nearest: Option<(Crossing, [Edge; 3])> = None;
+        for &edges in CaseIndex(case).triangles() {
+            let triangle = edges.map(|edge| self.vertex(local, &corners, edge));
+            if let Some(crossing) = ray.cross(triangle, self.origin)
+                && nearest.is_none_or(|(best, _)| crossing.distance < best.distance)
+            {
+                nearest = Some((crossing, edges));
+            }
+        }
+        let (crossing, edges) = nearest?;
+        let [low, high] = edges[crossing.nearest_corner].corners().map(Corner::index);
+        let inside = if CaseIndex(case).is_inside(Corner::ALL[low]) { low } else { high };
+        Some(RayHit {
+            distance: crossing.distance,
+            position: ray.at(crossing.distance),
+            normal: crossing.normal,
+            material: corners[inside].material,
+            cell,
+            chunk: self.position,
+        })
+    }
+
+    /// The sample at a corner of the cell at `local`, counted from the chunk's lowest point.
+    fn voxel(&self, local: [i32; 3], corner: Corner) -> Voxel<W> {
+        let (mut chunk, mut index, mut stride) = (0, 0, 1);
+        for axis in 0..3 {
+            let at = local[axis] + i32::from(corner.offset()[axis]);
+            if at == self.cells {
+                chunk |= 1 << axis;
+            } else {
+                index += at as usize * stride;
+            }
+            stride *= self.cells as usize;
+        }
+        self.chunks[chunk].voxel(index)
+    }
+
+    /// The mesh's vertex on an edge of the cell at `local`, counted from the chunk's lowest point, bit for bit.
+    fn vertex(&self, local: [i32; 3], corners: &[Voxel<W>; 8], edge: Edge) -> [f32; 3] {
+        let [low, high] = edge.corners();
+        let offset = low.offset();
+        let (a, b) = (corners[low.index()].weight, corners[high.index()].weight);
+        let mut vertex = [0, 1, 2].map(|axis| (local[axis] + i32::from(offset[axis])) as f32);
+        vertex[edge.axis()] += crossing_fraction(a, b, self.isovalue * W::SCALE);
+        vertex
+    }
+}

@@ -1,0 +1,116 @@
+//! [`Ray`]: walking the lattice, and crossing triangles.
+
+use crate::{lattice::Region, math::sqrt_f64};
+
+/// A ray of limited length.
+#[derive(Clone, Copy)]
+pub(super) struct Ray {
+    origin: [f64; 3],
+    /// Of unit length.
+    direction: [f64; 3],
+    max_distance: f64,
+}
+
+impl Ray {
+    /// `None` where a number is NaN, the origin or direction is infinite, or the direction or length is no such.
+    pub(super) fn new(origin: [f64; 3], direction: [f64; 3], max_distance: f64) -> Option<Self> {
+        let is_finite = origin.iter().chain(&direction).all(|v| v.is_finite());
+        let largest = direction.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
+        if !is_finite || largest == 0.0 || max_distance.is_nan() || max_distance < 0.0 {
+            return None;
+        }
+        Some(Self { origin, direction: unit(direction.map(|v| v / largest)), max_distance })
+    }
+
+    /// The point at a distance.
+    pub(super) fn at(&self, distance: f64) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.origin[axis] + self.direction[axis] * distance)
+    }
+
+    /// The cells of `region` that the ray passes, in order; cell `c` reaches from `c·size` to `(c + 1)·size`.
+    pub(super) fn walk(&self, region: Region, size: i64) -> impl Iterator<Item = [i32; 3]> {
+        let plane = move |cell: i32, side: i64| ((i64::from(cell) + side) * size) as f64;
+        // When the ray reaches a plane across `axis`; it does, since it moves along the axis.
+        let reaches = move |axis: usize, plane: f64| (plane - self.origin[axis]) / self.direction[axis];
+        let (mut start, mut end) = (0.0f64, self.max_distance);
+        for axis in 0..3 {
+            let [low, high] = [plane(region.min[axis], 0), plane(region.max[axis], 0)];
+            if self.direction[axis] != 0.0 {
+                let [a, b] = [reaches(axis, low), reaches(axis, high)];
+                (start, end) = (start.max(a.min(b)), end.min(a.max(b)));
+            } else if !(low..=high).contains(&self.origin[axis]) {
+                end = -1.0;
+            }
+        }
+        let mut next = (start <= end && !region.is_empty()).then(|| {
+            let entry = self.at(start);
+            [0, 1, 2].map(|axis| {
+                let cell = libm::floor(entry[axis] / size as f64);
+                (cell as i32).clamp(region.min[axis], region.max[axis] - 1)
+            })
+        });
+        core::iter::from_fn(move || {
+            let cell = next?;
+            let exits = [0, 1, 2].map(|axis| match self.direction[axis] {
+                0.0 => f64::INFINITY,
+                direction => reaches(axis, plane(cell[axis], (direction > 0.0).into())),
+            });
+            let axis = (0..3).fold(0, |first, axis| if exits[axis] < exits[first] { axis } else { first });
+            let mut following = cell;
+            following[axis] += if self.direction[axis] > 0.0 { 1 } else { -1 };
+            next = (exits[axis] <= end && region.contains(following)).then_some(following);
+            Some(cell)
+        })
+    }
+
+    /// Where the ray crosses a triangle, from either side. `triangle`: its corners, counted from lattice point `base`,
+    /// counter-clockwise as seen from outside.
+    ///
+    /// Rays between two triangles that share an edge hit one of them: Sven Woop, Carsten Benthin and Ingo Wald, "Watertight
+    /// Ray/Triangle Intersection" (2013).
+    pub(super) fn cross(&self, triangle: [[f32; 3]; 3], base: [i32; 3]) -> Option<Crossing> {
+        // Seen along the ray's main axis z, sheared so that the ray runs along it.
+        let d = self.direction;
+        let z = (0..3).fold(0, |main, axis| if d[axis].abs() > d[main].abs() { axis } else { main });
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let [a, b, c] = triangle.map(|corner| {
+            let p = [0, 1, 2].map(|axis| f64::from(corner[axis]) + (f64::from(base[axis]) - self.origin[axis]));
+            [p[x] - d[x] / d[z] * p[z], p[y] - d[y] / d[z] * p[z], p[z]]
+        });
+        let side = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+        let weights = [side(c, b), side(a, c), side(b, a)];
+        if weights.iter().any(|&w| w < 0.0) && weights.iter().any(|&w| w > 0.0) {
+            return None;
+        }
+        let sum = weights[0] + weights[1] + weights[2];
+        let distance = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / sum / d[z];
+        // A triangle seen from its edge has sum 0, and its distance is not a number.
+        if !(0.0..=self.max_distance).contains(&distance) {
+            return None;
+        }
+        let nearest_corner = (0..3).fold(0, |best, i| if weights[i].abs() > weights[best].abs() { i } else { best });
+        Some(Crossing { distance, nearest_corner, normal: normal(triangle) })
+    }
+}
+
+/// Where a ray crosses a triangle.
+#[derive(Clone, Copy)]
+pub(super) struct Crossing {
+    pub(super) distance: f64,
+    /// Which of the triangle's corners, 0–2, has the greatest share in the point.
+    pub(super) nearest_corner: usize,
+    /// Of unit length, to the outside.
+    pub(super) normal: [f32; 3],
+}
+
+/// The unit normal of a triangle, to the side from which it is counter-clockwise.
+fn normal(triangle: [[f32; 3]; 3]) -> [f32; 3] {
+    let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
+    let (u, v) = ([0, 1, 2].map(|i| b[i] - a[i]), [0, 1, 2].map(|i| c[i] - a[i]));
+    unit([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]).map(|v| v as f32)
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = sqrt_f64(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    v.map(|v| v / length)
+}

@@ -1,0 +1,227 @@
+//! Ray casts against all the triangles of all the meshes.
+
+use alloc::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    brush::{BrushShape, Operation, Stamp},
+    buffer::MeshBuffer,
+    mesher::{MeshSettings, Mesher},
+};
+
+const CELLS: u32 = 8;
+const BOUNDS: Region = Region::new([-1, -1, 0], [2, 1, 2]);
+
+/// A grid with balls added and dug, and some noise.
+fn grid(seed: u64, bounded: bool) -> Grid<i16> {
+    let mut grid = if bounded { Grid::bounded(CELLS, BOUNDS) } else { Grid::new(CELLS) }.unwrap();
+    let mut state = seed | 1;
+    let mut next = move |end: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % end
+    };
+    for number in 0..9 {
+        let center = [0, 1, 2].map(|_| next(240) as f64 / 10.0 - 8.0);
+        let shape = BrushShape::sphere(center, next(60) as f64 / 10.0 + 1.0).unwrap();
+        let operation = if number % 3 == 2 { Operation::Dig } else { Operation::Add };
+        grid.apply(&Stamp::new(shape, operation, number));
+    }
+    for _ in 0..60 {
+        let point = [0, 1, 2].map(|_| next(8) as i32);
+        grid.set(point, Voxel::new(next(600) as i16 - 300, next(5) as u8)).unwrap();
+    }
+    grid
+}
+
+struct Triangle {
+    chunk: [i32; 3],
+    /// In lattice units.
+    corners: [[f64; 3]; 3],
+    materials: [u8; 3],
+}
+
+/// All the triangles of all the chunks' meshes.
+fn triangles(grid: &Grid<i16>, isovalue: f32) -> Vec<Triangle> {
+    let (mut mesher, mut mesh, mut triangles) = (Mesher::new(), MeshBuffer::new(), Vec::new());
+    let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+    for chunk in grid.bounds().unwrap_or(Region::new([-5; 3], [6; 3])).points() {
+        grid.mesh_chunk(chunk, &mut mesher, &settings, &mut mesh).unwrap();
+        let base = grid.chunk_region(chunk).min;
+        triangles.extend(mesh.triangles().map(|indices| Triangle {
+            chunk,
+            corners: indices.map(|i| [0, 1, 2].map(|k| f64::from(mesh.positions[i as usize][k]) + f64::from(base[k]))),
+            materials: indices.map(|i| mesh.materials[i as usize]),
+        }));
+    }
+    triangles
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| a[i] - b[i])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The nearest triangle, its distance and the shares of its corners; `margin` is how far inside its edges the hit must be.
+fn brute_force<'a>(
+    triangles: &'a [Triangle],
+    origin: [f64; 3],
+    direction: [f64; 3],
+    max_distance: f64,
+    margin: f64,
+) -> Option<(f64, &'a Triangle, [f64; 3])> {
+    let direction = direction.map(|v| v / dot(direction, direction).sqrt());
+    let hits = triangles.iter().filter_map(|triangle| {
+        let [a, b, c] = triangle.corners;
+        let (u, v) = (minus(b, a), minus(c, a));
+        let p = cross(direction, v);
+        let determinant = dot(u, p);
+        let from_a = minus(origin, a);
+        let q = cross(from_a, u);
+        let shares = [dot(from_a, p) / determinant, dot(direction, q) / determinant];
+        let shares = [1.0 - shares[0] - shares[1], shares[0], shares[1]];
+        let distance = dot(v, q) / determinant;
+        let is_hit =
+            shares.iter().all(|&share| share >= margin) && (margin..=max_distance - margin).contains(&distance);
+        is_hit.then_some((distance, triangle, shares))
+    });
+    hits.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn direction() -> impl Strategy<Value = [f64; 3]> {
+    prop_oneof![
+        prop::array::uniform3(-1.0f64..1.0),
+        (0usize..3, -5.0f64..5.0).prop_map(|(axis, length)| [0, 1, 2].map(|i| if i == axis { length } else { 0.0 })),
+        (0usize..3, prop::array::uniform3(-1.0f64..1.0)).prop_map(|(axis, d)| [0, 1, 2].map(|i| if i == axis {
+            0.0
+        } else {
+            d[i]
+        })),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn rays_hit_what_the_meshes_show(
+        seed: u64,
+        bounded: bool,
+        isovalue in prop_oneof![Just(0.0f32), -0.9f32..0.45],
+        rays in prop::collection::vec((prop::array::uniform3(-30.0f64..40.0), direction(), 0.0f64..120.0), 60),
+        targets in prop::collection::vec(any::<prop::sample::Index>(), 60),
+    ) {
+        let grid = grid(seed, bounded);
+        let triangles = triangles(&grid, isovalue);
+        prop_assume!(!triangles.is_empty());
+        let mut hits = 0;
+        for (number, (&(origin, mut direction, max_distance), target)) in rays.iter().zip(&targets).enumerate() {
+            if number % 3 == 0 {
+                // Towards a point within a triangle, so that there is something to hit.
+                let [a, b, c] = triangles[target.index(triangles.len())].corners;
+                direction = minus([0, 1, 2].map(|i| a[i] * 0.5 + b[i] * 0.3 + c[i] * 0.2), origin);
+            }
+            if direction == [0.0; 3] {
+                continue;
+            }
+            let found = ray_cast(&grid, isovalue, origin, direction, max_distance);
+            let strict = brute_force(&triangles, origin, direction, max_distance, 1e-7);
+            let loose = brute_force(&triangles, origin, direction, max_distance, -1e-7);
+            if strict.map(|hit| hit.0) != loose.map(|hit| hit.0) {
+                continue; // grazing
+            }
+            hits += usize::from(found.is_some());
+            match (found, strict) {
+                (None, None) => {}
+                (Some(found), Some((distance, triangle, shares))) => {
+                    prop_assert!((found.distance - distance).abs() < 1e-6, "{found:?} instead of {distance}");
+                    let length = dot(direction, direction).sqrt();
+                    for axis in 0..3 {
+                        let exact = origin[axis] + direction[axis] / length * distance;
+                        prop_assert!((found.position[axis] - exact).abs() < 1e-6, "{found:?}");
+                        let at = (exact - f64::from(found.cell[axis])).clamp(0.0, 1.0) + f64::from(found.cell[axis]);
+                        prop_assert!((at - exact).abs() < 1e-6, "{found:?} lies outside of its cell");
+                    }
+                    prop_assert_eq!(found.chunk, triangle.chunk);
+                    prop_assert_eq!(found.chunk, grid.chunk_of(found.cell));
+                    let [a, b, c] = triangle.corners;
+                    let normal = cross(minus(b, a), minus(c, a));
+                    let cosine = dot(found.normal.map(f64::from), normal) / dot(normal, normal).sqrt();
+                    prop_assert!((cosine - 1.0).abs() < 1e-4, "{found:?}: cosine {cosine}");
+                    let best = shares.iter().fold(0.0f64, |best, &share| best.max(share));
+                    let nearest = (0..3).filter(|&i| shares[i] > best - 1e-6).map(|i| triangle.materials[i]);
+                    prop_assert!(nearest.clone().any(|material| material == found.material));
+                }
+                _ => prop_assert!(false, "{found:?}, but brute force finds {:?}", strict.map(|hit| hit.0)),
+            }
+        }
+        prop_assert!(hits >= 5, "only {hits} rays hit anything");
+    }
+
+    #[test]
+    fn no_ray_does_harm(
+        seed: u64,
+        bounded: bool,
+        origin in prop::array::uniform3(prop_oneof![any::<f64>(), -10.0f64..10.0, Just(-8.0), Just(f64::MAX)]),
+        direction in prop::array::uniform3(prop_oneof![any::<f64>(), Just(0.0), Just(5e-324), Just(-1.0)]),
+        max_distance in prop_oneof![any::<f64>(), Just(f64::INFINITY), Just(f64::NAN), Just(50.0)],
+        isovalue in prop_oneof![any::<f32>(), Just(0.0)],
+    ) {
+        if let Some(hit) = ray_cast(&grid(seed, bounded), isovalue, origin, direction, max_distance) {
+            prop_assert!((0.0..=max_distance).contains(&hit.distance), "{hit:?}");
+            prop_assert!(hit.position.iter().all(|v| v.is_finite()), "{hit:?}");
+            prop_assert!((dot(hit.normal.map(f64::from), hit.normal.map(f64::from)) - 1.0).abs() < 1e-5, "{hit:?}");
+        }
+    }
+
+    #[test]
+    fn weights_between_the_points_are_trilinear(
+        slope in prop::array::uniform3(-20i32..20), position in prop::array::uniform3(-7.0f64..6.9),
+    ) {
+        let mut grid = Grid::<i16>::new(CELLS).unwrap();
+        for point in Region::new([-8; 3], [8; 3]).points() {
+            let weight = (0..3).map(|i| slope[i] * point[i]).sum::<i32>() as i16;
+            grid.set(point, Voxel::new(weight, 0)).unwrap();
+        }
+        let exact = (0..3).map(|i| f64::from(slope[i]) * position[i]).sum::<f64>() / 256.0;
+        let found = weight_at(&grid, position).unwrap();
+        prop_assert!((f64::from(found) - exact).abs() < 1e-5, "{found}, not {exact}");
+    }
+}
+
+#[test]
+fn both_sides_are_hit_and_the_normal_points_out() {
+    let mut grid = Grid::<i16>::new(16).unwrap();
+    grid.apply(&Stamp::new(BrushShape::sphere([0.0; 3], 6.0).unwrap(), Operation::Add, 4));
+    let outside = ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], f64::INFINITY).unwrap();
+    assert!((outside.distance - 84.0).abs() < 0.05 && outside.normal[2] > 0.9);
+    assert_eq!((outside.material, outside.chunk), (4, [0, 0, 0]));
+    let inside = ray_cast(&grid, 0.0, [0.1, 0.2, 0.3], [0.0, 0.0, -1e-300], 20.0).unwrap();
+    assert!((inside.distance - 6.3).abs() < 0.05 && inside.normal[2] < -0.9);
+    assert_eq!(inside.chunk, [0, 0, -1]);
+    assert_eq!(ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], 83.9), None);
+    assert_eq!(ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, 2.0], f64::INFINITY), None);
+}
+
+#[test]
+fn what_is_no_ray_hits_nothing() {
+    let grid = grid(1, true);
+    let cast = |origin, direction, length| ray_cast(&grid, 0.0, origin, direction, length);
+    assert!(cast([4.0, 4.0, 40.0], [0.0, 0.0, -1.0], 100.0).is_some());
+    assert_eq!(cast([4.0, 4.0, 40.0], [0.0; 3], 100.0), None);
+    assert_eq!(cast([4.0, f64::NAN, 40.0], [0.0, 0.0, -1.0], 100.0), None);
+    assert_eq!(cast([4.0, 4.0, 40.0], [0.0, f64::INFINITY, -1.0], 100.0), None);
+    assert_eq!(cast([4.0, 4.0, 40.0], [0.0, 0.0, -1.0], f64::NAN), None);
+    assert_eq!(ray_cast(&grid, f32::NAN, [4.0, 4.0, 40.0], [0.0, 0.0, -1.0], 100.0), None);
+    assert_eq!(ray_cast(&Grid::<i16>::new(8).unwrap(), 0.0, [0.0; 3], [1.0; 3], f64::INFINITY), None);
+    assert_eq!(weight_at(&grid, [0.0, f64::INFINITY, 0.0]), None);
+    assert_eq!(weight_at(&grid, [f64::MAX; 3]), Some(i16::OUTSIDE.to_voxels()));
+}
