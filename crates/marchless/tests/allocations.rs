@@ -1,0 +1,110 @@
+//! Once its buffers are warm, meshing allocates nothing.
+
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    cell::Cell,
+};
+
+use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+
+thread_local! {
+    /// What this thread has allocated; the test harness has threads of its own.
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: everything is handed to the system's allocator as it is.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller's promises are the same.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are the same.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.get();
+    work();
+    ALLOCATIONS.get() - before
+}
+
+/// A weight for every sample: `bumpiness` 0 is a ball, more adds noise.
+fn weights<W: Weight>(shape: Shape, bumpiness: f32) -> Vec<W> {
+    let [nx, ny, nz] = shape.size();
+    let mut weights = Vec::new();
+    for (z, y, x) in (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| (z, y, x)))) {
+        let noise = (x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791)) >> 8 & 255;
+        let from_middle = [(x, nx), (y, ny), (z, nz)].map(|(at, size)| at as f32 - size as f32 / 2.0);
+        let ball = from_middle.iter().map(|v| v * v).sum::<f32>().sqrt() - ny as f32 / 3.0;
+        weights.push(W::from_voxels(ball + bumpiness * (noise as f32 / 128.0 - 1.0)));
+    }
+    weights
+}
+
+fn mesh_all<W: Weight>(fields: &[(Shape, Vec<W>, Vec<u8>)], mesher: &mut Mesher, out: &mut MeshBuffer) {
+    for (shape, weights, materials) in fields {
+        let plain = Samples::new(*shape, weights).expect("one weight a sample");
+        let with_materials = plain.with_materials(materials).expect("one material a sample");
+        for samples in [plain, plain.padded(), with_materials, with_materials.padded()] {
+            for normals in [true, false] {
+                mesher
+                    .mesh(samples, &MeshSettings { isovalue: 0.25, normals }, out)
+                    .expect("the shapes are large enough");
+                assert!(!out.is_empty());
+            }
+        }
+    }
+}
+
+fn warm_meshing_allocates_nothing<W: Weight>() {
+    let shapes = [[35, 35, 35], [130, 9, 12], [12, 40, 7]].map(|size| Shape::new(size).expect("the sizes are small"));
+    let fields: Vec<_> = shapes
+        .iter()
+        .flat_map(|&shape| [0.0, 8.0].map(|bumpiness| (shape, weights::<W>(shape, bumpiness), vec![1u8; shape.len()])))
+        .collect();
+    let (mut mesher, mut out) = (Mesher::new(), MeshBuffer::new());
+    assert_ne!(allocations(|| mesh_all(&fields, &mut mesher, &mut out)), 0, "cold buffers must grow");
+    assert_eq!(allocations(|| mesh_all(&fields, &mut mesher, &mut out)), 0);
+}
+
+#[test]
+fn warm_meshing_of_i8_allocates_nothing() {
+    warm_meshing_allocates_nothing::<i8>();
+}
+
+#[test]
+fn warm_meshing_of_i16_allocates_nothing() {
+    warm_meshing_allocates_nothing::<i16>();
+}
+
+#[test]
+fn warm_meshing_of_f32_allocates_nothing() {
+    warm_meshing_allocates_nothing::<f32>();
+}
+
+#[test]
+fn warm_meshing_of_a_chunk_allocates_nothing() {
+    let shape = Shape::cube(16).expect("16 is small");
+    let mut grid = Grid::<i16>::new(16).expect("16 is allowed");
+    for position in [[0, 0, 0], [1, 0, 0], [0, -1, 1]] {
+        let chunk = Chunk::from_samples(weights(shape, 4.0), vec![2; shape.len()], 16).expect("the lengths fit");
+        grid.insert(position, chunk).expect("the grid has no bounds");
+    }
+    let neighbourhood = grid.neighbourhood([0, 0, 0]);
+    let (mut mesher, mut block, mut out) = (Mesher::new(), Block::new(), MeshBuffer::new());
+    let mut mesh = || {
+        neighbourhood.mesh(&mut mesher, &mut block, &MeshSettings::default(), &mut out).expect("a chunk can be meshed");
+        assert!(!out.is_empty());
+    };
+    assert_ne!(allocations(&mut mesh), 0, "cold buffers must grow");
+    assert_eq!(allocations(&mut mesh), 0);
+}

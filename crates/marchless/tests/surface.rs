@@ -1,0 +1,189 @@
+//! What every surface promises, whatever the samples are: closed within the box, 2-manifold, consistently oriented,
+//! nothing degenerate, normals of length 1; and what smooth fields get on top.
+
+#[path = "support/fields.rs"]
+mod fields;
+
+use std::collections::HashMap;
+
+use fields::{Field, TestWeight};
+use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
+use proptest::prelude::*;
+
+fn mesh<W: Weight>(samples: Samples<'_, W>, isovalue: f32) -> MeshBuffer {
+    let mut mesh = MeshBuffer::new();
+    let settings = MeshSettings { isovalue, normals: true };
+    Mesher::new().mesh(samples, &settings, &mut mesh).expect("the samples can be meshed");
+    mesh
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (0..3).map(|axis| a[axis] * b[axis]).sum()
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|axis| a[axis] - b[axis])
+}
+
+fn unit(v: [f32; 3]) -> [f32; 3] {
+    v.map(|component| component / dot(v, v).sqrt())
+}
+
+/// The sides of triangles that no other triangle has the other way round.
+fn open_sides(mesh: &MeshBuffer) -> Vec<[u32; 2]> {
+    let mut sides = HashMap::new();
+    for [a, b, c] in mesh.triangles() {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            if sides.remove(&[to, from]).is_none() {
+                sides.insert([from, to], ());
+            }
+        }
+    }
+    sides.into_keys().collect()
+}
+
+fn check<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
+    let mesh = mesh(field.samples(), field.isovalue);
+    let report = MeshReport::new(&mesh.positions, &mesh.indices);
+    prop_assert!(report.is_clean(), "{}", report);
+
+    let open = open_sides(&mesh);
+    prop_assert_eq!(open.len(), report.boundary_edges);
+    for side in open {
+        let ends = side.map(|vertex| mesh.positions[vertex as usize]);
+        let on_border = (0..3).any(|axis| {
+            let last = (field.meshed_size()[axis] - 1) as f32;
+            ends.iter().all(|end| end[axis] == 0.0) || ends.iter().all(|end| end[axis] == last)
+        });
+        prop_assert!(on_border, "open within the box, between {:?}", ends);
+    }
+    for &normal in &mesh.normals {
+        prop_assert!((dot(normal, normal) - 1.0).abs() < 1e-5, "{:?} is no unit vector", normal);
+    }
+    Ok(())
+}
+
+/// The same field with air all around.
+fn enclosed<W: TestWeight>(mut field: Field<W>) -> Field<W> {
+    let size = field.shape.size();
+    let depth = 1 + u32::from(field.padded);
+    for index in 0..field.weights.len() as u32 {
+        let at = [index % size[0], index / size[0] % size[1], index / size[0] / size[1]];
+        if (0..3).any(|axis| at[axis] < depth || at[axis] + depth >= size[axis]) {
+            field.weights[index as usize] = W::OUTSIDE;
+        }
+    }
+    field
+}
+
+fn check_enclosed<W: TestWeight>(field: Field<W>) -> Result<(), TestCaseError> {
+    let field = enclosed(field);
+    let mesh = mesh(field.samples(), field.isovalue);
+    let report = MeshReport::new(&mesh.positions, &mesh.indices);
+    prop_assert!(report.is_closed() && report.is_clean(), "{}", report);
+    prop_assert_eq!(report.euler % 2, 0);
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn fields_of_i8_have_sound_surfaces(field in Field::<i8>::any()) {
+        check(&field)?;
+        check_enclosed(field)?;
+    }
+
+    #[test]
+    fn fields_of_i16_have_sound_surfaces(field in Field::<i16>::any()) {
+        check(&field)?;
+        check_enclosed(field)?;
+    }
+
+    #[test]
+    fn fields_of_f32_have_sound_surfaces(field in Field::<f32>::any()) {
+        check(&field)?;
+        check_enclosed(field)?;
+    }
+
+    /// Whole steps, so that the samples are the plane's exactly.
+    #[test]
+    fn planes_are_exact(
+        slope in proptest::array::uniform3(-200i16..=200),
+        offset in -1500i16..1500,
+        padded: bool,
+    ) {
+        prop_assume!(slope != [0; 3]);
+        let shape = Shape::new([9, 6, 7]).expect("the sizes are small");
+        let padding = i16::from(padded);
+        let weights: Vec<i16> = (0..shape.len() as i16)
+            .map(|index| {
+                let at = [index % 9, index / 9 % 6, index / 54].map(|at| at - padding);
+                offset + (0..3).map(|axis| slope[axis] * at[axis]).sum::<i16>()
+            })
+            .collect();
+        let samples = Samples::new(shape, &weights).expect("one weight a sample");
+        let mesh = mesh(if padded { samples.padded() } else { samples }, 0.0);
+
+        let slope = slope.map(f32::from);
+        let normal = unit(slope);
+        for (&position, &found) in mesh.positions.iter().zip(&mesh.normals) {
+            for axis in 0..3 {
+                prop_assert!((found[axis] - normal[axis]).abs() < 1e-6, "{:?} for {:?}", found, normal);
+            }
+            let along = position.iter().map(|v| v.fract()).fold(0.0, f32::max);
+            // Where it is not clamped.
+            if (0.001..0.999).contains(&along) {
+                let distance = (dot(position, slope) + f32::from(offset)) / dot(slope, slope).sqrt();
+                prop_assert!(distance.abs() < 1e-5, "{:?} is {} off the plane", position, distance);
+            }
+        }
+    }
+
+    #[test]
+    fn balls_face_outside(
+        center in proptest::array::uniform3(6.0f32..9.0),
+        radius in 2.5f32..5.0,
+        isovalue in -0.5f32..0.5,
+    ) {
+        let shape = Shape::cube(16).expect("16 is small");
+        let weights: Vec<f32> = (0..shape.len())
+            .map(|index| {
+                let from_center = minus([index % 16, index / 16 % 16, index / 256].map(|at| at as f32), center);
+                dot(from_center, from_center).sqrt() - radius
+            })
+            .collect();
+        let mesh = mesh(Samples::new(shape, &weights).expect("one weight a sample"), isovalue);
+        let report = MeshReport::new(&mesh.positions, &mesh.indices);
+        prop_assert!(report.is_closed() && report.is_clean(), "{}", report);
+        prop_assert_eq!((report.components, report.euler), (1, 2));
+        for (&position, &normal) in mesh.positions.iter().zip(&mesh.normals) {
+            let from_center = minus(position, center);
+            let off = dot(from_center, from_center).sqrt() - radius - isovalue;
+            prop_assert!(off.abs() < 0.1, "{:?} is {} off the ball", position, off);
+            prop_assert!(dot(normal, unit(from_center)) > 0.98, "{:?} at {:?}", normal, from_center);
+        }
+        // The volume enclosed is positive only where triangles turn counter-clockwise, and close to the ball's.
+        let volume: f32 = mesh
+            .triangles()
+            .map(|triangle| {
+                let [[ax, ay, az], [bx, by, bz], c] = triangle.map(|v| minus(mesh.positions[v as usize], center));
+                dot([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], c) / 6.0
+            })
+            .sum();
+        let expected = 4.0 / 3.0 * core::f32::consts::PI * (radius + isovalue).powi(3);
+        prop_assert!((0.8..1.01).contains(&(volume / expected)), "{} for {}", volume, expected);
+    }
+}
+
+/// The clamp of crossings still has room in `f32` at the far end of the longest row that is promised.
+#[test]
+fn rows_of_4096_cells_are_sound() {
+    let shape = Shape::new([4097, 3, 3]).expect("it fits in memory");
+    let weights: Vec<i16> =
+        (0..shape.len() as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 20) as i16 % 3 - 1).collect();
+    for size in [[4097, 3, 3], [3, 4097, 3], [3, 3, 4097]] {
+        let shape = Shape::new(size).expect("it fits in memory");
+        let mesh = mesh(Samples::new(shape, &weights).expect("one weight a sample"), 0.0);
+        let report = MeshReport::new(&mesh.positions, &mesh.indices);
+        assert!(report.is_clean() && report.triangles > 10_000, "{report}");
+    }
+}
