@@ -1,0 +1,67 @@
+//! [`Chunk`] and [`ChunkGeometry`]: the entities that mirror what is drawn of a terrain, its children.
+
+use std::sync::Arc;
+
+use bevy_camera::primitives::Aabb;
+use bevy_camera::visibility::{NoAutoAabb, Visibility};
+use bevy_ecs::prelude::*;
+use bevy_math::{IVec3, UVec3, Vec3};
+use bevy_reflect::prelude::*;
+use bevy_transform::components::Transform;
+use marchless::MeshBuffer;
+
+/// One chunk of a terrain, on an entity of its own, a child of the terrain.
+///
+/// The plugin spawns these and gives each its place, its `Aabb` and, where there is something to draw, a
+/// `Mesh3d`. Samples live in the terrain's [`TerrainVolume`](crate::terrain::TerrainVolume). Despawning one ends its drawing, not its samples.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[reflect(Component, Debug, PartialEq, Hash, Clone)]
+#[component(immutable)]
+#[require(ChunkGeometry, Transform, Visibility, NoAutoAabb)]
+pub struct Chunk {
+    /// The terrain it belongs to.
+    pub terrain: Entity,
+    /// Its place in the terrain, in chunks; 0 on each axis is the lowest.
+    pub position: IVec3,
+}
+
+/// What a chunk looks like at the moment: the mesh in voxels from the chunk's lowest corner, without any renderer.
+///
+/// Empty where nothing is drawn. The same entity's `Mesh3d` holds the same mesh, where there are `Assets<Mesh>`.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Debug, Clone)]
+#[component(immutable)]
+pub struct ChunkGeometry {
+    /// The mesh; replaced, never changed.
+    #[reflect(ignore)]
+    pub mesh: Arc<MeshBuffer>,
+}
+
+/// The bundle of a chunk that has not been meshed yet.
+pub(crate) fn new_chunk(terrain: Entity, position: [i32; 3], cells: u32, voxel_size: f32) -> impl Bundle {
+    (
+        Chunk { terrain, position: position.into() },
+        chunk_transform(position, cells, voxel_size),
+        chunk_bounds([cells; 3]),
+        ChildOf(terrain),
+    )
+}
+
+/// From a chunk's own space, in voxels, to the terrain's.
+pub(crate) fn chunk_transform(position: [i32; 3], cells: u32, voxel_size: f32) -> Transform {
+    let corner = IVec3::from(position) * cells as i32;
+    Transform::from_translation(corner.as_vec3() * voxel_size).with_scale(Vec3::splat(voxel_size))
+}
+
+/// The box of a whole chunk, in voxels.
+pub(crate) fn chunk_bounds(cells: [u32; 3]) -> Aabb {
+    Aabb::from_min_max(Vec3::ZERO, UVec3::from(cells).as_vec3())
+}
+
+/// The box of a mesh, in voxels; that of the whole chunk where it is empty.
+pub(crate) fn mesh_bounds(mesh: &MeshBuffer, cells: [u32; 3]) -> Aabb {
+    match mesh.bounds {
+        Some([min, max]) => Aabb::from_min_max(min.into(), max.into()),
+        None => chunk_bounds(cells),
+    }
+}

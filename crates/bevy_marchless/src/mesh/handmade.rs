@@ -1,0 +1,202 @@
+//! [`ChunkSamples`]: samples of the game's own on any entity, and their mesh.
+
+use std::sync::Arc;
+
+use bevy_camera::visibility::{NoAutoAabb, Visibility};
+use bevy_ecs::prelude::*;
+use bevy_math::UVec3;
+use bevy_mesh::Mesh3d;
+use bevy_reflect::prelude::*;
+use bevy_transform::components::Transform;
+use marchless::{MeshSettings, Samples, SamplesError, Shape, ShapeError, Weight};
+use thiserror::Error;
+
+use super::Screen;
+use super::job::{Meshed, mesh_with};
+use crate::chunk::ChunkGeometry;
+use crate::schedule::MarchlessSettings;
+use crate::terrain::Palette;
+use crate::work::{Priority, Results, Ticket, WorkQueue};
+
+/// Samples of your own: insert them on any entity, and their mesh appears, and again after each change.
+///
+/// The mesh is in voxels from the first sample; the entity's `Transform` is yours. It stays open where the surface
+/// meets the samples' border, and takes no stamps.
+///
+/// ```
+/// use bevy_marchless::prelude::*;
+/// # use bevy_ecs::prelude::*;
+/// # use bevy_math::UVec3;
+///
+/// fn setup(mut commands: Commands) {
+///     // A plane at height 1.5 in 4 × 4 × 4 samples.
+///     let distances: Vec<f32> = (0..64).map(|index| (index / 4 % 4) as f32 - 1.5).collect();
+///     let samples = ChunkSamples::from_distances(UVec3::splat(4), &distances).expect("64 distances");
+///     commands.spawn(samples);
+/// }
+/// ```
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Debug, Clone, from_reflect = false)]
+#[require(ChunkGeometry, Transform, Visibility, NoAutoAabb, MeshingState)]
+pub struct ChunkSamples {
+    #[reflect(ignore)]
+    data: Arc<Data>,
+    /// The surface lies where the weight equals this many voxels; finite. Default 0.
+    pub isovalue: f32,
+    /// Whether the mesh has normals. Default true.
+    pub normals: bool,
+    /// The colours of the materials.
+    pub palette: Palette,
+}
+
+/// What the samples are, shared with the jobs that mesh them.
+#[derive(Debug)]
+struct Data {
+    shape: Shape,
+    weights: Vec<i16>,
+    /// None, or one a sample.
+    materials: Vec<u8>,
+}
+
+impl ChunkSamples {
+    /// `weights`: signed distances in 1/256 voxel, negative inside; `[x·y·z]` of `shape`, x fastest.
+    ///
+    /// # Errors
+    /// [`ChunkSamplesError`] where an axis has fewer than 2 samples or the length is not the shape's.
+    pub fn new(shape: UVec3, weights: Vec<i16>) -> Result<Self, ChunkSamplesError> {
+        if shape.min_element() < 2 {
+            return Err(ChunkSamplesError::TooSmall { found: shape });
+        }
+        let shape = Shape::new(shape.to_array())?;
+        Samples::new(shape, &weights)?;
+        let data = Arc::new(Data { shape, weights, materials: Vec::new() });
+        Ok(Self { data, isovalue: 0.0, normals: true, palette: Palette::default() })
+    }
+
+    /// The same from signed distances in voxels, rounded to 1/256 and saturated at ±128 voxels.
+    ///
+    /// # Errors
+    /// As [`ChunkSamples::new`].
+    pub fn from_distances(shape: UVec3, distances: &[f32]) -> Result<Self, ChunkSamplesError> {
+        Self::new(shape, distances.iter().map(|&distance| i16::from_voxels(distance)).collect())
+    }
+
+    /// The same samples, made of `materials`, one a sample. Without them all is material 0.
+    ///
+    /// # Errors
+    /// [`ChunkSamplesError::Samples`] where the length is not the shape's.
+    pub fn with_materials(self, materials: Vec<u8>) -> Result<Self, ChunkSamplesError> {
+        let (shape, weights) = (self.data.shape, self.data.weights.clone());
+        Samples::new(shape, &weights)?.with_materials(&materials)?;
+        Ok(Self { data: Arc::new(Data { shape, weights, materials }), ..self })
+    }
+
+    /// Samples per axis.
+    pub fn shape(&self) -> UVec3 {
+        self.data.shape.size().into()
+    }
+
+    /// The weights, in 1/256 voxel, x fastest.
+    pub fn weights(&self) -> &[i16] {
+        &self.data.weights
+    }
+
+    /// The materials, x fastest; empty where there are none.
+    pub fn materials(&self) -> &[u8] {
+        &self.data.materials
+    }
+
+    /// The job that meshes the samples as they are now.
+    fn mesh_job(&self, wants_asset: bool) -> impl FnOnce() -> Meshed + Send + 'static {
+        let data = self.data.clone();
+        let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals };
+        let colors = wants_asset.then(|| Arc::new(self.palette.to_vertex_colors()));
+        move || {
+            let zeros;
+            let materials = if data.materials.is_empty() {
+                zeros = vec![0; data.weights.len()];
+                &zeros
+            } else {
+                &data.materials
+            };
+            let samples = Samples::new(data.shape, &data.weights)
+                .and_then(|samples| samples.with_materials(materials))
+                .expect("the lengths have been checked");
+            mesh_with([0; 3], colors.as_ref(), |mesher, _, out| mesher.mesh(samples, &settings, out))
+        }
+    }
+}
+
+/// Why something is not [`ChunkSamples`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ChunkSamplesError {
+    /// There is no cell.
+    #[error("a chunk needs at least 2 samples per axis, but there are {found}")]
+    TooSmall {
+        /// What was given.
+        found: UVec3,
+    },
+    /// There are too many samples.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// A length is not the shape's.
+    #[error(transparent)]
+    Samples(#[from] SamplesError),
+}
+
+/// What is being done with an entity's samples.
+#[derive(Component, Debug, Default)]
+pub(super) struct MeshingState {
+    changed: bool,
+    /// The job that meshes an earlier state; its result is shown, and the newest comes next.
+    job: Option<Ticket>,
+}
+
+/// What the jobs have meshed.
+#[derive(Resource, Default)]
+pub(super) struct HandmadeResults(Results<(Entity, Meshed)>);
+
+/// Meshes changed samples: small ones at once, others in jobs, one at a time for each entity.
+pub(super) fn mesh_samples(
+    mut chunks: Query<(Entity, Ref<ChunkSamples>, &mut MeshingState)>,
+    queue: Res<WorkQueue>,
+    results: Res<HandmadeResults>,
+    settings: Res<MarchlessSettings>,
+    mut screen: Screen,
+) {
+    for (entity, meshed) in results.0.take() {
+        if let Ok((_, samples, mut state)) = chunks.get_mut(entity) {
+            state.job = None;
+            show(entity, &samples, meshed, &mut screen);
+        }
+    }
+    let mut cells_left = settings.inline_chunks * 32 * 32 * 32;
+    for (entity, samples, mut state) in &mut chunks {
+        if samples.is_changed() {
+            state.changed = true;
+        }
+        if !state.changed || state.job.is_some() {
+            continue;
+        }
+        state.changed = false;
+        let job = samples.mesh_job(screen.assets.is_some());
+        if samples.weights().len() <= cells_left {
+            cells_left -= samples.weights().len();
+            show(entity, &samples, job(), &mut screen);
+        } else {
+            let results = results.0.clone();
+            state.job = Some(queue.push(Priority::Edit, move || results.push((entity, job()))));
+        }
+    }
+}
+
+fn show(entity: Entity, samples: &ChunkSamples, meshed: Meshed, screen: &mut Screen) {
+    screen.stats.count_mesh(meshed.time);
+    screen.show(entity, meshed, (samples.shape() - 1).to_array());
+}
+
+/// Without samples there is nothing to draw.
+pub(super) fn forget_removed_samples(removed: On<Remove, ChunkSamples>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<(Mesh3d, ChunkGeometry, MeshingState)>();
+}

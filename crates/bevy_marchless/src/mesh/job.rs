@@ -1,0 +1,102 @@
+//! [`MeshJob`]: meshing one chunk, on any thread.
+
+use core::cell::RefCell;
+use core::time::Duration;
+use std::sync::Arc;
+use std::time::Instant;
+
+use bevy_asset::RenderAssetUsages;
+use bevy_math::bounding::Aabb3d;
+use bevy_mesh::{Indices, Mesh, PrimitiveTopology};
+use bevy_tasks::ComputeTaskPool;
+use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, Neighbourhood};
+
+use super::ATTRIBUTE_MATERIAL;
+
+/// The linear colours of all materials.
+pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
+
+/// A chunk's new mesh.
+pub(crate) struct Meshed {
+    pub(crate) position: [i32; 3],
+    pub(crate) geometry: Arc<MeshBuffer>,
+    /// The same as an asset, where assets are wanted and there is something to draw.
+    pub(crate) mesh: Option<Mesh>,
+    /// How long it took.
+    pub(crate) time: Duration,
+}
+
+impl Meshed {
+    /// Nothing to draw.
+    pub(crate) fn empty(position: [i32; 3]) -> Self {
+        Self { position, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
+    }
+}
+
+/// A chunk to be meshed.
+pub(crate) struct MeshJob {
+    pub(crate) position: [i32; 3],
+    pub(crate) samples: Neighbourhood<i16>,
+    pub(crate) settings: MeshSettings,
+    /// The colours of its vertices; `None` where no asset is wanted.
+    pub(crate) colors: Option<Colors>,
+}
+
+impl MeshJob {
+    pub(crate) fn run(self) -> Meshed {
+        mesh_with(self.position, self.colors.as_ref(), |mesher, block, out| {
+            self.samples.mesh(mesher, block, &self.settings, out)
+        })
+    }
+}
+
+/// Runs `mesh` with this thread's scratch memory, and makes an asset of what comes out. A failure is reported and
+/// leaves nothing to draw.
+pub(super) fn mesh_with(
+    position: [i32; 3],
+    colors: Option<&Colors>,
+    mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
+) -> Meshed {
+    thread_local! {
+        static SCRATCH: RefCell<(Mesher, Block<i16>)> = RefCell::new((Mesher::new(), Block::new()));
+    }
+    let start = Instant::now();
+    let mut geometry = MeshBuffer::new();
+    let result = SCRATCH.with_borrow_mut(|(mesher, block)| mesh(mesher, block, &mut geometry));
+    if let Err(error) = result {
+        bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
+        geometry.clear();
+    }
+    let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors));
+    Meshed { position, geometry: Arc::new(geometry), mesh, time: start.elapsed() }
+}
+
+/// Runs jobs at once, on the compute pool where there is one.
+pub(crate) fn mesh_now(mut jobs: Vec<MeshJob>) -> Vec<Meshed> {
+    match ComputeTaskPool::try_get() {
+        Some(pool) if jobs.len() > 1 => pool.scope(|scope| {
+            for job in jobs.drain(..) {
+                scope.spawn(async move { job.run() });
+            }
+        }),
+        _ => jobs.into_iter().map(MeshJob::run).collect(),
+    }
+}
+
+/// A mesh for the render world: positions in voxels, colours and materials a vertex.
+fn to_asset(geometry: &MeshBuffer, colors: &Colors) -> Mesh {
+    let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, geometry.positions.clone())
+        .with_inserted_indices(Indices::U32(geometry.indices.clone()));
+    if !geometry.normals.is_empty() {
+        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, geometry.normals.clone());
+    }
+    let materials = || geometry.materials.iter().copied();
+    if !geometry.materials.is_empty() {
+        let vertex_colors: Vec<_> = materials().map(|material| colors[usize::from(material)]).collect();
+        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, vertex_colors);
+        mesh.insert_attribute(ATTRIBUTE_MATERIAL, materials().map(u32::from).collect::<Vec<_>>());
+    }
+    mesh.final_aabb = geometry.bounds.map(|[min, max]| Aabb3d::from_min_max(min, max));
+    mesh
+}

@@ -1,0 +1,316 @@
+//! [`Terrain`]: a terrain's settings and source; give it to an entity, and chunks appear.
+
+mod fill;
+mod prepare;
+mod volume;
+
+use core::fmt;
+use std::sync::Arc;
+
+use bevy_app::{App, Plugin, PostUpdate};
+use bevy_camera::visibility::Visibility;
+use bevy_color::{Color, ColorToComponents as _, LinearRgba};
+use bevy_ecs::prelude::*;
+use bevy_math::{UVec3, Vec3};
+use bevy_reflect::prelude::*;
+use bevy_transform::components::Transform;
+use marchless::{DEFAULT_CHUNK_CELLS, MeshSettings, Source};
+use thiserror::Error;
+
+pub(crate) use fill::distance_to_middle;
+pub use volume::TerrainVolume;
+pub(crate) use volume::{Group, Pending, around};
+
+use crate::chunk::{Chunk, ChunkGeometry};
+use crate::schedule::MarchlessSystems;
+use crate::source::Air;
+
+/// A terrain of a fixed extent, its settings and what it is made of.
+///
+/// Samples lie on a lattice, one voxel apart; the terrain's origin is its lowest corner. The
+/// entity's `Transform` moves, turns and scales the whole terrain; several terrains may live side by side.
+///
+/// Changing `source`, `extent`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone; changing the
+/// other settings only meshes it anew. Settings out of range are refused with an error in the log and a
+/// [`TerrainError`] component; those before them stay in effect.
+///
+/// Outside of its extent there is air, so that its surface is closed, with walls half a voxel inside the border (where the isovalue is below 0.5).
+///
+/// ```
+/// use bevy_marchless::prelude::*;
+/// # use bevy_ecs::prelude::*;
+/// # use bevy_math::UVec3;
+///
+/// fn setup(mut commands: Commands) {
+///     // A ball of radius 40 in the middle of 128³ voxels: the distance from its surface at each position.
+///     let ball = |[x, y, z]: [f64; 3]| ((x - 64.0).powi(2) + (y - 64.0).powi(2) + (z - 64.0).powi(2)).sqrt() - 40.0;
+///     commands.spawn(Terrain::new(ball).with_extent(UVec3::splat(4)));
+/// }
+/// ```
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Default, Debug, Clone)]
+#[require(Transform, Visibility, TerrainVolume)]
+pub struct Terrain {
+    /// How large it is, in chunks; at least 1 an axis, at most [`Terrain::MAX_CHUNKS`] in all. Default 8 × 4 × 8.
+    pub extent: UVec3,
+    /// Cells of a chunk per axis, 8 to 62. Default 32.
+    pub chunk_cells: u32,
+    /// The distance between two samples, in world units; above 0. Default 1.
+    pub voxel_size: f32,
+    /// The surface lies where the weight equals this many voxels; finite. Default 0.
+    ///
+    /// Edits leave weights between −4 and 4 voxels, so isovalues beyond show none of them.
+    pub isovalue: f32,
+    /// Whether meshes have normals. Default true.
+    pub normals: bool,
+    /// The colours of the materials.
+    pub palette: Palette,
+    /// What the terrain is made of before it is edited. Default: air.
+    pub source: SourceHandle,
+}
+
+impl Terrain {
+    /// The most chunks that a terrain may have.
+    pub const MAX_CHUNKS: u64 = 65_536;
+
+    /// A terrain made of `source`, with the default settings.
+    pub fn new(source: impl Source) -> Self {
+        Self {
+            extent: UVec3::new(8, 4, 8),
+            chunk_cells: DEFAULT_CHUNK_CELLS,
+            voxel_size: 1.0,
+            isovalue: 0.0,
+            normals: true,
+            palette: Palette::default(),
+            source: SourceHandle::new(source),
+        }
+    }
+
+    /// The same terrain, so many chunks large.
+    #[must_use]
+    pub fn with_extent(self, extent: UVec3) -> Self {
+        Self { extent, ..self }
+    }
+
+    /// The same terrain with chunks of so many cells per axis.
+    #[must_use]
+    pub fn with_chunk_cells(self, chunk_cells: u32) -> Self {
+        Self { chunk_cells, ..self }
+    }
+
+    /// The same terrain with samples so far apart, in world units.
+    #[must_use]
+    pub fn with_voxel_size(self, voxel_size: f32) -> Self {
+        Self { voxel_size, ..self }
+    }
+
+    /// The same terrain with another isovalue, in voxels.
+    #[must_use]
+    pub fn with_isovalue(self, isovalue: f32) -> Self {
+        Self { isovalue, ..self }
+    }
+
+    /// The same terrain with or without normals.
+    #[must_use]
+    pub fn with_normals(self, normals: bool) -> Self {
+        Self { normals, ..self }
+    }
+
+    /// The same terrain in other colours.
+    #[must_use]
+    pub fn with_palette(self, palette: Palette) -> Self {
+        Self { palette, ..self }
+    }
+
+    /// Makes the terrain of another source; what was dug is gone.
+    pub fn set_source(&mut self, source: impl Source) {
+        self.source = SourceHandle::new(source);
+    }
+
+    /// Makes the terrain of nothing but air.
+    pub fn clear(&mut self) {
+        self.set_source(Air);
+    }
+
+    /// How large the terrain is, in voxels per axis.
+    pub fn size_in_voxels(&self) -> UVec3 {
+        self.extent.saturating_mul(UVec3::splat(self.chunk_cells))
+    }
+
+    /// How large the terrain is in its own space, in world units per axis.
+    pub fn size(&self) -> Vec3 {
+        self.size_in_voxels().as_vec3() * self.voxel_size
+    }
+
+    /// Whether all settings are within their ranges.
+    ///
+    /// # Errors
+    /// [`TerrainError`] about the first that is not.
+    pub fn check(&self) -> Result<(), TerrainError> {
+        let chunks = self.extent.to_array().map(u64::from).into_iter().try_fold(1, u64::checked_mul);
+        if !chunks.is_some_and(|chunks| (1..=Self::MAX_CHUNKS).contains(&chunks)) {
+            return Err(TerrainError::Extent { found: self.extent });
+        }
+        if marchless::Grid::<i16>::new(self.chunk_cells).is_err() {
+            return Err(TerrainError::ChunkCells { found: self.chunk_cells });
+        }
+        if !(self.voxel_size > 0.0 && self.voxel_size.is_finite()) {
+            return Err(TerrainError::VoxelSize { found: self.voxel_size });
+        }
+        if !self.isovalue.is_finite() {
+            return Err(TerrainError::Isovalue { found: self.isovalue });
+        }
+        Ok(())
+    }
+
+    pub(crate) fn mesh_settings(&self) -> MeshSettings {
+        MeshSettings { isovalue: self.isovalue, normals: self.normals }
+    }
+}
+
+/// A terrain of air.
+impl Default for Terrain {
+    fn default() -> Self {
+        Self::new(Air)
+    }
+}
+
+/// Why a terrain's settings are refused. On the terrain's entity while that is so.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Error)]
+#[reflect(Component, Debug, PartialEq, Clone)]
+#[non_exhaustive]
+pub enum TerrainError {
+    /// No chunk, or too many.
+    #[error("a terrain's extent must be 1 to {} chunks in all, but it is {found}", Terrain::MAX_CHUNKS)]
+    Extent {
+        /// What was given, in chunks.
+        found: UVec3,
+    },
+    /// Chunks too small or too large.
+    #[error("a chunk must have 8 to 62 cells per axis, but `chunk_cells` is {found}")]
+    ChunkCells {
+        /// What was given.
+        found: u32,
+    },
+    /// Voxels of no size.
+    #[error("a terrain's voxel size must be finite and above 0, but it is {found}")]
+    VoxelSize {
+        /// What was given, in world units.
+        found: f32,
+    },
+    /// NaN or infinite.
+    #[error("a terrain's isovalue must be finite, but it is {found}")]
+    Isovalue {
+        /// What was given, in voxels.
+        found: f32,
+    },
+}
+
+/// A shared [`Source`].
+#[derive(Reflect, Clone)]
+#[reflect(opaque)]
+#[reflect(Default, Debug, Clone)]
+pub struct SourceHandle(Arc<dyn Source>);
+
+impl SourceHandle {
+    /// A handle to `source`.
+    pub fn new(source: impl Source) -> Self {
+        Self(Arc::new(source))
+    }
+
+    /// The source itself.
+    pub fn get(&self) -> &Arc<dyn Source> {
+        &self.0
+    }
+}
+
+impl From<Arc<dyn Source>> for SourceHandle {
+    fn from(source: Arc<dyn Source>) -> Self {
+        Self(source)
+    }
+}
+
+impl Default for SourceHandle {
+    fn default() -> Self {
+        Self::new(Air)
+    }
+}
+
+impl fmt::Debug for SourceHandle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SourceHandle(..)")
+    }
+}
+
+/// Handles are equal where they share one source.
+impl PartialEq for SourceHandle {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// The colours of materials, in order of their numbers. With fewer than 256 they repeat; with none, all is white.
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Default, Debug, PartialEq, Clone)]
+pub struct Palette {
+    /// One a material.
+    pub colors: Vec<Color>,
+}
+
+impl Palette {
+    /// A palette of `colors`.
+    pub fn new<C: Into<Color>>(colors: impl IntoIterator<Item = C>) -> Self {
+        Self { colors: colors.into_iter().map(Into::into).collect() }
+    }
+
+    /// The colour of `material`.
+    pub fn color(&self, material: u8) -> Color {
+        match self.colors.len() {
+            0 => Color::WHITE,
+            count => self.colors[usize::from(material) % count],
+        }
+    }
+
+    /// The colours of all materials, as vertices have them.
+    pub(crate) fn to_vertex_colors(&self) -> [[f32; 4]; 256] {
+        core::array::from_fn(|material| LinearRgba::from(self.color(material as u8)).to_f32_array())
+    }
+}
+
+/// Grass, earth, rock, sand, snow, clay, slate and moss.
+impl Default for Palette {
+    fn default() -> Self {
+        Self::new(
+            [
+                [0.35, 0.52, 0.22],
+                [0.45, 0.33, 0.22],
+                [0.50, 0.49, 0.47],
+                [0.82, 0.73, 0.52],
+                [0.94, 0.95, 0.97],
+                [0.66, 0.36, 0.25],
+                [0.30, 0.32, 0.36],
+                [0.42, 0.48, 0.28],
+            ]
+            .map(|[red, green, blue]| Color::srgb(red, green, blue)),
+        )
+    }
+}
+
+/// Keeps terrains' volumes: prepares them, follows their settings and fills them from their sources.
+#[derive(Default)]
+pub struct TerrainPlugin;
+
+impl Plugin for TerrainPlugin {
+    fn build(&self, app: &mut App) {
+        crate::source::register_types(app);
+        app.register_type::<Terrain>()
+            .register_type::<TerrainVolume>()
+            .register_type::<TerrainError>()
+            .register_type::<Chunk>()
+            .register_type::<ChunkGeometry>()
+            .init_resource::<fill::FillResults>()
+            .add_observer(prepare::forget_despawned_chunk)
+            .add_systems(PostUpdate, prepare::prepare_terrains.in_set(MarchlessSystems::Prepare))
+            .add_systems(PostUpdate, fill::take_filled_chunks.in_set(MarchlessSystems::Fill));
+    }
+}

@@ -1,0 +1,253 @@
+//! [`WorkQueue`]: one queue of jobs in order of priority, worked off by at most as many tasks as their pool has threads.
+//!
+//! Bevy's task pools know no priorities, and a task for each job would stand sampling before an edit. So few tasks take
+//! their jobs from here, the most urgent first, and let other users of the pool in between two jobs.
+
+use core::cmp::{Ordering, Reverse};
+use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::collections::BinaryHeap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use bevy_ecs::prelude::*;
+use bevy_tasks::{AsyncComputeTaskPool, futures_lite::future::yield_now};
+
+use crate::schedule::MarchlessSettings;
+
+/// What comes first, and within one kind, the lowest number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Priority {
+    /// Meshing what has changed.
+    Edit,
+    /// Meshing a chunk for the first time.
+    FirstMesh(u32),
+    /// Sampling a chunk.
+    Fill(u32),
+}
+
+/// All jobs that wait for a thread. Dropping it drops them.
+#[derive(Resource, Default)]
+pub(crate) struct WorkQueue(Arc<Shared>);
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    jobs: BinaryHeap<Job>,
+    pushed: u64,
+    workers: usize,
+}
+
+struct Job {
+    order: Reverse<(Priority, u64)>,
+    claimed: Arc<AtomicBool>,
+    run: Box<dyn FnOnce() + Send>,
+}
+
+/// The right to a job's result. Dropping it withdraws a job that has not begun.
+#[derive(Debug)]
+pub(crate) struct Ticket(Arc<AtomicBool>);
+
+impl Ticket {
+    /// Withdraws the job, and tells whether that was in time: `false` means that it has begun.
+    pub(crate) fn withdraw(&self) -> bool {
+        !self.0.swap(true, Relaxed)
+    }
+}
+
+impl Drop for Ticket {
+    fn drop(&mut self) {
+        self.withdraw();
+    }
+}
+
+impl WorkQueue {
+    /// Adds a job, which starts at the next [`start_work`] at the earliest.
+    pub(crate) fn push(&self, priority: Priority, run: impl FnOnce() + Send + 'static) -> Ticket {
+        let claimed = Arc::new(AtomicBool::new(false));
+        let mut state = self.0.lock();
+        let order = Reverse((priority, state.pushed));
+        state.pushed += 1;
+        state.jobs.push(Job { order, claimed: claimed.clone(), run: Box::new(run) });
+        Ticket(claimed)
+    }
+
+    /// How many jobs wait whose priority is `counted`.
+    pub(crate) fn waiting(&self, counted: impl Fn(Priority) -> bool) -> usize {
+        let state = self.0.lock();
+        state.jobs.iter().filter(|job| counted(job.order.0.0) && !job.claimed.load(Relaxed)).count()
+    }
+}
+
+impl Drop for WorkQueue {
+    fn drop(&mut self) {
+        self.0.lock().jobs.clear();
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes the most urgent job that has not been withdrawn.
+    fn take(&self) -> Option<Box<dyn FnOnce() + Send>> {
+        take(&mut self.lock())
+    }
+
+    /// Takes a job as [`Shared::take`] does, or signs the worker off.
+    fn take_or_leave(&self) -> Option<Box<dyn FnOnce() + Send>> {
+        let mut state = self.lock();
+        let job = take(&mut state);
+        if job.is_none() {
+            state.workers -= 1;
+        }
+        job
+    }
+}
+
+fn take(state: &mut State) -> Option<Box<dyn FnOnce() + Send>> {
+    while let Some(job) = state.jobs.pop() {
+        if !job.claimed.swap(true, Relaxed) {
+            return Some(job.run);
+        }
+    }
+    None
+}
+
+/// Runs a job. Jobs report their own failures; a panic that escapes one must not take a worker with it.
+fn run(job: Box<dyn FnOnce() + Send>) {
+    if catch_unwind(AssertUnwindSafe(job)).is_err() {
+        bevy_log::error!("a terrain job panicked; its result is lost");
+    }
+}
+
+async fn work(shared: Arc<Shared>) {
+    while let Some(job) = shared.take_or_leave() {
+        run(job);
+        yield_now().await;
+    }
+}
+
+/// Starts tasks for the jobs that wait or, without threads, does a budget of them at once.
+pub(crate) fn start_work(queue: Res<WorkQueue>, settings: Res<MarchlessSettings>) {
+    let pool = AsyncComputeTaskPool::try_get();
+    match (settings.budget, pool) {
+        (None, Some(pool)) => {
+            let mut state = queue.0.lock();
+            let wanted = state.jobs.len().min(pool.thread_num().max(1));
+            while state.workers < wanted {
+                state.workers += 1;
+                pool.spawn(work(queue.0.clone())).detach();
+            }
+        }
+        (budget, _) => {
+            for _ in 0..budget.unwrap_or(8) {
+                let Some(job) = queue.0.take() else { break };
+                run(job);
+            }
+        }
+    }
+}
+
+/// Where jobs leave what they made.
+pub(crate) struct Results<T>(Arc<Mutex<Vec<T>>>);
+
+impl<T> Results<T> {
+    pub(crate) fn push(&self, result: T) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(result);
+    }
+
+    /// All results since the last time, in the order in which they were made.
+    pub(crate) fn take(&self) -> Vec<T> {
+        core::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl<T> Clone for Results<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<T> Default for Results<T> {
+    fn default() -> Self {
+        Self(Arc::default())
+    }
+}
+
+impl PartialEq for Job {
+    fn eq(&self, other: &Self) -> bool {
+        self.order == other.order
+    }
+}
+
+impl Eq for Job {}
+
+impl PartialOrd for Job {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Job {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.order.cmp(&other.order)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn queue_of(priorities: &[Priority]) -> (WorkQueue, Vec<Ticket>, Results<Priority>) {
+        let (queue, results) = (WorkQueue::default(), Results::default());
+        let push = |&priority: &Priority| {
+            let results = results.clone();
+            queue.push(priority, move || results.push(priority))
+        };
+        let tickets = priorities.iter().map(push).collect();
+        (queue, tickets, results)
+    }
+
+    #[test]
+    fn the_most_urgent_job_comes_first() {
+        use Priority::{Edit, Fill, FirstMesh};
+        let (queue, _tickets, results) = queue_of(&[Fill(0), FirstMesh(2), Edit, FirstMesh(1)]);
+        while let Some(job) = queue.0.take() {
+            run(job);
+        }
+        assert_eq!(results.take(), [Edit, FirstMesh(1), FirstMesh(2), Fill(0)]);
+    }
+
+    #[test]
+    fn dropping_a_ticket_withdraws_its_job_unless_it_has_begun() {
+        let (queue, mut tickets, results) = queue_of(&[Priority::Fill(0), Priority::Fill(1), Priority::Fill(2)]);
+        run(queue.0.take().unwrap());
+        assert!(!tickets.remove(0).withdraw(), "it has run");
+        assert_eq!(queue.waiting(|_| true), 2);
+        drop(tickets.remove(0));
+        assert_eq!(queue.waiting(|_| true), 1);
+        run(queue.0.take().unwrap());
+        assert!(queue.0.take().is_none());
+        assert_eq!(results.take(), [Priority::Fill(0), Priority::Fill(2)]);
+    }
+
+    #[test]
+    fn a_panicking_job_does_not_stop_the_next() {
+        let queue = WorkQueue::default();
+        let results = Results::default();
+        let _bad = queue.push(Priority::Edit, || panic!("on purpose"));
+        let _good = queue.push(Priority::Edit, {
+            let results = results.clone();
+            move || results.push(1)
+        });
+        while let Some(job) = queue.0.take() {
+            run(job);
+        }
+        assert_eq!(results.take(), [1]);
+    }
+}

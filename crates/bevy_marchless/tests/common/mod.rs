@@ -1,0 +1,173 @@
+//! The harness of the headless tests: apps without window and renderer, and bounded numbers of updates.
+#![allow(dead_code, reason = "each test uses a part of the harness")]
+#![allow(unreachable_pub, reason = "a module of each test")]
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bevy_app::{App, TaskPoolPlugin};
+use bevy_asset::{AssetPlugin, Assets};
+use bevy_ecs::prelude::*;
+use bevy_marchless::prelude::*;
+use bevy_math::{IVec3, UVec3, Vec3};
+use bevy_mesh::{Mesh, MeshPlugin};
+use bevy_transform::TransformPlugin;
+use marchless::{MeshBuffer, MeshReport};
+
+/// What `MinimalPlugins` and `TransformPlugin` bring, and the plugin. Jobs run on threads.
+pub fn bare_app() -> App {
+    let mut app = App::new();
+    app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, MarchlessPlugins));
+    app
+}
+
+/// The same with mesh assets.
+pub fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, AssetPlugin::default(), MeshPlugin, MarchlessPlugins));
+    app
+}
+
+/// The same without threads: so many jobs an update, always in the same order.
+pub fn app_with_budget(budget: usize) -> App {
+    let mut app = app();
+    app.insert_resource(MarchlessSettings { budget: Some(budget), ..MarchlessSettings::default() });
+    app
+}
+
+/// Flat ground of 2 × 2 × 2 chunks of 16 voxels, its surface 16.5 voxels high.
+pub fn ground() -> Terrain {
+    small(Terrain::new(|[_, y, _]: [f64; 3]| y - 16.5))
+}
+
+/// A ball of radius 12 in the middle of the same extent.
+pub fn ball() -> Terrain {
+    small(Terrain::new(|p: [f64; 3]| p.map(|v| (v - 16.0) * (v - 16.0)).iter().sum::<f64>().sqrt() - 12.0))
+}
+
+/// 2 × 2 × 2 chunks of 16 voxels.
+pub fn small(terrain: Terrain) -> Terrain {
+    terrain.with_extent(UVec3::splat(2)).with_chunk_cells(16)
+}
+
+/// Spawns a terrain and updates until it is drawn.
+pub fn settled(app: &mut App, terrain: Terrain) -> Entity {
+    let entity = app.world_mut().spawn(terrain).id();
+    settle(app, entity);
+    entity
+}
+
+/// Updates until everything of the terrain is filled and drawn, at most 2,000 times.
+pub fn settle(app: &mut App, terrain: Entity) {
+    update_until(app, |app| volume(app, terrain).is_settled());
+}
+
+/// Updates until `done`, at most 2,000 times, and lets other threads work in between.
+pub fn update_until(app: &mut App, done: impl Fn(&App) -> bool) {
+    for _ in 0..2_000 {
+        app.update();
+        if done(app) {
+            return;
+        }
+        std::thread::sleep(Duration::from_micros(500));
+    }
+    panic!("it did not happen in 2,000 updates");
+}
+
+pub fn volume(app: &App, terrain: Entity) -> &TerrainVolume {
+    app.world().get::<TerrainVolume>(terrain).expect("a terrain has a volume")
+}
+
+/// The geometry of every chunk of a terrain, in order of position.
+pub fn geometry(app: &mut App, terrain: Entity) -> Vec<(IVec3, Arc<MeshBuffer>)> {
+    let mut chunks = app.world_mut().query::<(&Chunk, &ChunkGeometry)>();
+    let of_terrain = chunks.iter(app.world()).filter(|(chunk, _)| chunk.terrain == terrain);
+    let mut all: Vec<_> = of_terrain.map(|(chunk, geometry)| (chunk.position, geometry.mesh.clone())).collect();
+    all.sort_by_key(|(position, _)| position.to_array());
+    all
+}
+
+/// What the samples ask for: each chunk meshed afresh, in order of position.
+pub fn expected_geometry(app: &App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)> {
+    let volume = volume(app, terrain);
+    let settings = volume.settings().expect("good settings");
+    let settings = marchless::MeshSettings { isovalue: settings.isovalue, normals: settings.normals };
+    let mut mesher = marchless::Mesher::new();
+    volume
+        .grid()
+        .bounds()
+        .expect("bounded")
+        .points()
+        .map(|position| {
+            let mut mesh = MeshBuffer::new();
+            volume.grid().mesh_chunk(position, &mut mesher, &settings, &mut mesh).expect("samples of a chunk");
+            (IVec3::from(position), mesh)
+        })
+        .collect()
+}
+
+/// Asserts that what is drawn is what the samples ask for.
+pub fn assert_drawn(app: &mut App, terrain: Entity) {
+    let expected = expected_geometry(app, terrain);
+    let drawn = geometry(app, terrain);
+    assert_eq!(drawn.len(), expected.len());
+    for (position, mesh) in expected {
+        let (_, found) = drawn.iter().find(|(at, _)| *at == position).expect("every chunk has an entity");
+        assert_eq!(**found, mesh, "chunk {position}");
+    }
+}
+
+/// The union of all chunks drawn of a terrain, with the vertices on shared borders merged.
+pub fn report(app: &mut App, terrain: Entity) -> MeshReport {
+    let cells = volume(app, terrain).grid().chunk_cells() as i32;
+    let mut positions = Vec::new();
+    let mut indices = Vec::new();
+    let mut known = std::collections::HashMap::new();
+    for (chunk, mesh) in geometry(app, terrain) {
+        let corner = (chunk * cells).as_vec3();
+        for index in &mesh.indices {
+            let position = (corner + Vec3::from(mesh.positions[*index as usize])).to_array();
+            let next = positions.len() as u32;
+            let index = *known.entry(position.map(f32::to_bits)).or_insert(next);
+            if index == next {
+                positions.push(position);
+            }
+            indices.push(index);
+        }
+    }
+    MeshReport::new(&positions, &indices)
+}
+
+pub fn mesh_assets(app: &App) -> usize {
+    app.world().resource::<Assets<Mesh>>().len()
+}
+
+/// A source that stops where it is until the gate is opened, and can tell whether it was reached.
+#[derive(Clone, Default)]
+pub struct Gate {
+    open: Arc<AtomicBool>,
+    reached: Arc<Mutex<u32>>,
+}
+
+impl Gate {
+    pub fn open(&self) {
+        self.open.store(true, Ordering::Release);
+    }
+
+    /// How often somebody has come to the gate.
+    pub fn reached(&self) -> u32 {
+        *self.reached.lock().unwrap()
+    }
+
+    /// Waits at the gate, at most 20 seconds.
+    pub fn pass(&self) {
+        *self.reached.lock().unwrap() += 1;
+        for _ in 0..20_000 {
+            if self.open.load(Ordering::Acquire) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
