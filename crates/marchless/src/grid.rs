@@ -118,12 +118,13 @@ impl<W: Weight> Grid<W> {
     /// # Errors
     /// [`GridError::OutOfBounds`]; nothing is changed then.
     pub fn set(&mut self, point: [i32; 3], voxel: Voxel<W>) -> Result<(), GridError> {
-        let (cells, index, border) = (self.cells, self.index(point), self.border());
-        let weight = border.map_or(voxel.weight, |border| border.clip(point, voxel.weight));
+        let position = self.chunk_of(point);
+        self.check(position)?;
+        let weight = self.border().map_or(voxel.weight, |border| border.clip(point, voxel.weight));
         let voxel = Voxel { weight, ..voxel };
-        let chunk = self.chunk_mut(self.chunk_of(point))?;
-        if chunk.voxel(index) != voxel {
-            let samples = chunk.samples_mut(cells);
+        if self.get(point) != voxel {
+            let (cells, index) = (self.cells, self.index(point));
+            let samples = self.chunk_mut(position)?.samples_mut(cells);
             samples.weights[index] = voxel.weight;
             samples.materials[index] = voxel.material;
             self.mark_dirty(Region::new(point, point).grown(0, 1));

@@ -53,11 +53,19 @@ impl<W: Weight> Neighbourhood<W> {
             let spans = [spans[index % 3], spans[index / 3 % 3], spans[index / 9]];
             match chunk {
                 Some(Chunk::Samples(samples)) => {
-                    copy(&mut out.weights, n + 3, &samples.weights, n, spans);
-                    copy(&mut out.materials, n + 3, &samples.materials, n, spans);
+                    copy(&mut out.weights, &samples.weights, n, spans);
+                    copy(&mut out.materials, &samples.materials, n, spans);
                 }
-                Some(Chunk::Uniform(voxel)) => fill(out, spans, |_| *voxel),
-                None => fill(out, spans, |point| self.beyond(point)),
+                Some(Chunk::Uniform(voxel)) => out.rows(spans, |_, weights, materials| {
+                    weights.fill(voxel.weight);
+                    materials.fill(voxel.material);
+                }),
+                None => out.rows(spans, |[x, y, z], weights, materials| {
+                    for (i, (weight, material)) in weights.iter_mut().zip(materials).enumerate() {
+                        let voxel = self.beyond([x + i, y, z]);
+                        (*weight, *material) = (voxel.weight, voxel.material);
+                    }
+                }),
             }
         }
     }
@@ -120,6 +128,18 @@ impl<W: Weight> Block<W> {
         self.weights.resize(self.shape.len(), W::OUTSIDE);
         self.materials.resize(self.shape.len(), 0);
     }
+
+    /// Calls `change` with every row of a box: the position of its first sample in the block, weights, materials.
+    fn rows(&mut self, [x, y, z]: [Span; 3], mut change: impl FnMut([usize; 3], &mut [W], &mut [u8])) {
+        let [_, along_y, along_z] = self.shape.strides();
+        for k in z.to..z.to + z.len {
+            for j in y.to..y.to + y.len {
+                let start = x.to + along_y * j + along_z * k;
+                let row = start..start + x.len;
+                change([x.to, j, k], &mut self.weights[row.clone()], &mut self.materials[row]);
+            }
+        }
+    }
 }
 
 impl<W: Weight> Default for Block<W> {
@@ -136,32 +156,17 @@ struct Span {
     len: usize,
 }
 
-/// Copies a box out of the cube `source` of `n` samples per axis into the cube `target` of `side` samples per axis.
-fn copy<T: Copy>(target: &mut [T], side: usize, source: &[T], n: usize, [x, y, z]: [Span; 3]) {
+/// Copies a box out of the cube `source` of `n` samples per axis into the cube `target` of `n + 3` samples per axis.
+fn copy<T: Copy>(target: &mut [T], source: &[T], n: usize, [x, y, z]: [Span; 3]) {
     for k in 0..z.len {
         for j in 0..y.len {
-            let to = x.to + side * (y.to + j + side * (z.to + k));
+            let to = x.to + (n + 3) * (y.to + j + (n + 3) * (z.to + k));
             let from = x.from + n * (y.from + j + n * (z.from + k));
             // Calling out to copy one or two samples, as most rows are, would cost more than all the long rows.
             match x.len {
                 1 => target[to] = source[from],
                 2 => (target[to], target[to + 1]) = (source[from], source[from + 1]),
                 len => target[to..to + len].copy_from_slice(&source[from..from + len]),
-            }
-        }
-    }
-}
-
-/// Fills a box of the block; `voxel` is asked with positions in the block.
-fn fill<W: Weight>(out: &mut Block<W>, [x, y, z]: [Span; 3], voxel: impl Fn([usize; 3]) -> Voxel<W>) {
-    let side = out.shape.size()[0] as usize;
-    for k in z.to..z.to + z.len {
-        for j in y.to..y.to + y.len {
-            let row = side * (j + side * k);
-            for i in x.to..x.to + x.len {
-                let Voxel { weight, material } = voxel([i, j, k]);
-                out.weights[row + i] = weight;
-                out.materials[row + i] = material;
             }
         }
     }

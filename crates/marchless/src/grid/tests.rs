@@ -247,6 +247,19 @@ fn every_write_of_a_clone_leaves_the_original_alone() {
 }
 
 #[test]
+fn snapshots_may_be_sent_to_other_threads() {
+    fn sent<T: Send + Sync + 'static>() {}
+    sent::<(Neighbourhood<i16>, Chunk<f32>, Grid<i8>)>();
+}
+
+#[test]
+fn writing_what_is_there_changes_nothing() {
+    let mut grid = Grid::<i16>::new(8).unwrap();
+    grid.set([1, 2, 3], Voxel::AIR).unwrap();
+    assert!(grid.chunks().next().is_none() && grid.dirty().is_empty());
+}
+
+#[test]
 fn reading_and_clipping_copy_nothing() {
     let mut grid = Grid::<i16>::bounded(8, Region::new([0; 3], [1; 3])).unwrap();
     let shared = Arc::new(ChunkSamples { weights: (0..512).map(|i| 1000 + i).collect(), materials: vec![0; 512] });
