@@ -97,14 +97,17 @@ impl Stamp {
         Self { stroke: Some(stroke), ..self }
     }
 
-    /// The smallest box around all lattice points that the stamp may change, whatever their samples are.
+    /// A box around all lattice points that the stamp may change, whatever their samples are.
     pub fn region(&self) -> Region {
-        self.shape.region(if self.reaches_outside() { EDIT_LIMIT as u32 / UNITS } else { 0 })
+        self.shape.region(self.reach() / UNITS)
     }
 
-    /// Whether the stamp also moves weights outside its shape, up to [`EDIT_LIMIT`] away.
-    const fn reaches_outside(&self) -> bool {
-        self.stroke.is_none() && !matches!(self.operation, Operation::Paint)
+    /// How far outside its shape the stamp changes weights, in 1/256 voxel.
+    const fn reach(&self) -> u32 {
+        match (self.operation, self.stroke) {
+            (Operation::Add | Operation::Dig, None) => EDIT_LIMIT as u32,
+            _ => 0,
+        }
     }
 }
 

@@ -174,8 +174,8 @@ impl<W: Weight> Surface<W> {
     /// The sample at a corner of the cell at `local`, counted from the chunk's lowest point.
     fn voxel(&self, local: [i32; 3], corner: Corner) -> Voxel<W> {
         let (mut chunk, mut index, mut stride) = (0, 0, 1);
-        for axis in 0..3 {
-            let at = local[axis] + i32::from(corner.offset()[axis]);
+        for (axis, (low, offset)) in local.into_iter().zip(corner.offset()).enumerate() {
+            let at = low + i32::from(offset);
             if at == self.cells {
                 chunk |= 1 << axis;
             } else {

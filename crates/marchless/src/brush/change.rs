@@ -19,13 +19,12 @@ pub(super) struct Change {
 impl Change {
     pub(super) fn new(stamp: &Stamp) -> Self {
         let Stamp { operation, material, stroke, .. } = *stamp;
-        let limit = i32::from(EDIT_LIMIT);
-        let (low, high) = match (operation, &stroke) {
-            (Operation::Paint, _) => (-1, 0),
-            (_, Some(stroke)) => (-rim(stroke), 0),
-            (_, None) => (-limit, limit),
+        let low = match (operation, &stroke) {
+            (Operation::Paint, _) => -1,
+            (_, Some(stroke)) => -rim(stroke),
+            (_, None) => -i32::from(EDIT_LIMIT),
         };
-        Self { shape: stamp.shape.limited(), operation, material, stroke, low, high }
+        Self { shape: stamp.shape.limited(), operation, material, stroke, low, high: stamp.reach() as i32 }
     }
 
     /// What becomes of `old` at `point`. `floor`: the least weight that an edit may leave there, not below

@@ -93,8 +93,8 @@ impl BrushShape {
         self.limited().distance_within(point, i32::MIN, FAR)
     }
 
-    /// The smallest box around all lattice points whose distance is less than `margin` voxels. Margins over 2²⁰
-    /// voxels count as 2²⁰.
+    /// A box around all lattice points whose distance is less than `margin` voxels. Margins over 2²⁰ voxels count as
+    /// 2²⁰.
     pub fn region(&self, margin: u32) -> Region {
         let (low, high, sizes) = match self.limited() {
             Self::Sphere { center, radius } => (center, center, [radius; 3]),
@@ -132,7 +132,6 @@ impl BrushShape {
     /// `high`: from 0 to [`FAR`].
     #[inline]
     pub(super) fn distance_within(&self, point: [i32; 3], low: i32, high: i32) -> i32 {
-        debug_assert_eq!(*self, self.limited());
         let clamp = Clamp { low: i64::from(low), high: i64::from(high) };
         let distance = match *self {
             Self::Sphere { center, radius } => clamp.to_point(offset(point, center), radius),

@@ -71,13 +71,13 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// The nearest triangle, its distance and the shares of its corners; `margin` is how far inside its edges the hit must be.
-fn brute_force<'a>(
-    triangles: &'a [Triangle],
+fn brute_force(
+    triangles: &[Triangle],
     origin: [f64; 3],
     direction: [f64; 3],
     max_distance: f64,
     margin: f64,
-) -> Option<(f64, &'a Triangle, [f64; 3])> {
+) -> Option<(f64, &Triangle, [f64; 3])> {
     let direction = direction.map(|v| v / dot(direction, direction).sqrt());
     let hits = triangles.iter().filter_map(|triangle| {
         let [a, b, c] = triangle.corners;
