@@ -55,8 +55,8 @@ pub(crate) mod private {
         fn threshold(isovalue: f32) -> Self::Threshold;
         /// Whether the sample lies below the isovalue.
         fn inside(self, threshold: Self::Threshold) -> bool;
-        /// The sample for gradients: proportional to the distance, the same factor for all samples; may be infinite or NaN.
-        fn raw(self) -> f32;
+        /// `a − b` in steps, for gradients; may be infinite or NaN.
+        fn difference(a: Self, b: Self) -> f32;
         /// How far along the edge from `a` to `b` the isovalue lies, before clamping; `a` and `b` lie on its two
         /// sides. Finite. `isovalue`: in steps (voxels × `SCALE`).
         fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
@@ -111,8 +111,8 @@ macro_rules! integer_weight {
             }
 
             #[inline(always)]
-            fn raw(self) -> f32 {
-                f32::from(self)
+            fn difference(a: Self, b: Self) -> f32 {
+                (i32::from(a) - i32::from(b)) as f32
             }
 
             #[inline(always)]
@@ -158,8 +158,8 @@ impl private::Sealed for f32 {
     }
 
     #[inline(always)]
-    fn raw(self) -> f32 {
-        self
+    fn difference(a: Self, b: Self) -> f32 {
+        a - b
     }
 
     #[inline(always)]

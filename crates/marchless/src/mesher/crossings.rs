@@ -36,6 +36,12 @@ impl<'a> RowCrossings<'a> {
         Self { layout, row: layout.row(signs, index), next: [layout.row(signs, next_y), layout.row(signs, next_z)] }
     }
 
+    /// The signs of word `word`.
+    #[inline(always)]
+    pub(super) fn signs(&self, word: usize) -> u64 {
+        self.row[word]
+    }
+
     /// The crossings of word `word` on edges along x, y and z.
     #[inline(always)]
     pub(super) fn word(&self, word: usize) -> [u64; 3] {

@@ -2,68 +2,77 @@
 
 use alloc::vec::Vec;
 
-use super::{Layout, crossings::Row, set_bits, shifted};
+use super::{Layout, crossings::Row, set_bits};
 use crate::cases::{CROSSED_EDGES, TRIANGLE_COUNTS, TRIANGLES};
+
+/// Room for the indices of any cell's triangles.
+const MOST: usize = 15;
 
 /// Fills `indices`, cell by cell, x fastest.
 pub(super) fn join(layout: &Layout, signs: &[u64], rows: &[Row], indices: &mut Vec<u32>) {
+    let mut end = 0;
     for z in 0..layout.size[2] - 1 {
         for y in 0..layout.size[1] - 1 {
             let low = y + z * layout.size[1];
             let high = low + layout.size[1];
-            CellRow {
-                signs: [low, low + 1, high, high + 1].map(|row| layout.row(signs, row)),
-                next: NextVertex::new([low, low + 1, high, high + 1].map(|row| rows[row])),
-            }
-            .join(layout, indices);
-        }
-    }
-}
-
-/// One row of cells between four rows of samples: those at `[y, z]`, `[y + 1, z]`, `[y, z + 1]` and `[y + 1, z + 1]`.
-struct CellRow<'a> {
-    signs: [&'a [u64]; 4],
-    next: NextVertex,
-}
-
-impl CellRow<'_> {
-    #[inline(always)]
-    fn join(mut self, layout: &Layout, indices: &mut Vec<u32>) {
-        for word in 0..layout.words {
-            let low = self.signs.map(|row| row[word]);
-            let high = self.signs.map(|row| shifted(row, word));
-            let any = low.iter().chain(&high).fold(0, |all, word| all | word);
-            let all = low.iter().chain(&high).fold(u64::MAX, |all, word| all & word);
-            let active = any & !all & layout.x_edges(word);
-            if active == 0 {
+            // Then all four rows are alike, and all of one sign.
+            if rows[low].is_empty() && rows[low + 1].is_empty() {
                 continue;
             }
-            // Every cell writes room for five triangles and keeps as many as it has.
-            let mut end = indices.len();
-            indices.resize(end + 15 * active.count_ones() as usize, 0);
-            for x in set_bits(active) {
-                let case = case_index(&low, &high, x);
-                let vertices = self.next.advance(CROSSED_EDGES[case]);
-                if let Some(room) = indices[end..].first_chunk_mut::<15>() {
-                    for (corner, edge) in room.iter_mut().zip(TRIANGLES[case].as_flattened()) {
-                        *corner = vertices[edge.index() & 15];
-                    }
-                }
-                end += 3 * TRIANGLE_COUNTS[case] as usize;
-            }
-            indices.truncate(end);
+            let signs = [low, low + 1, high, high + 1].map(|row| layout.row(signs, row));
+            let next = NextVertex::new([&rows[low], &rows[low + 1], &rows[high], &rows[high + 1]]);
+            end = join_row(layout, signs, next, indices, end);
         }
     }
+    indices.truncate(end);
 }
 
-/// The case of cell `x` of a row, from the sign words of its low and high corners.
+/// Writes the triangles of one row of cells from `indices[end]` on and returns where they end. `signs`: the rows of samples at
+/// `[y, z]`, `[y + 1, z]`, `[y, z + 1]` and `[y + 1, z + 1]`.
 #[inline(always)]
-fn case_index(low: &[u64; 4], high: &[u64; 4], x: usize) -> usize {
-    let mut case = 0;
-    for row in 0..4 {
-        case |= (low[row] >> x & 1) << (2 * row) | (high[row] >> x & 1) << (2 * row + 1);
+fn join_row(
+    layout: &Layout,
+    signs: [&[u64]; 4],
+    mut next: NextVertex,
+    indices: &mut Vec<u32>,
+    mut end: usize,
+) -> usize {
+    let cells = layout.size[0] - 1;
+    // In groups of 32 cells, whose 33 signs fit a word.
+    for group in 0..cells.div_ceil(32) {
+        let signs = signs.map(|row| group_signs(row, group));
+        let [any, all] = signs.iter().fold([0, u64::MAX], |[any, all], word| [any | word, all & word]);
+        let valid = (1u64 << (cells - 32 * group).min(32)) - 1;
+        let active = (any | any >> 1) & !(all & all >> 1) & valid;
+        if active == 0 {
+            continue;
+        }
+        // Every cell is given room for the most triangles, and keeps what it needs.
+        let room = end + MOST * active.count_ones() as usize;
+        if indices.len() < room {
+            indices.resize(room + 2048, 0);
+        }
+        for x in set_bits(active) {
+            let case =
+                (signs[0] >> x & 3 | (signs[1] >> x & 3) << 2 | (signs[2] >> x & 3) << 4 | (signs[3] >> x & 3) << 6)
+                    as usize;
+            let vertices = next.advance(case);
+            if let Some(corners) = indices[end..].first_chunk_mut::<MOST>() {
+                for (corner, edge) in corners.iter_mut().zip(TRIANGLES[case].as_flattened()) {
+                    *corner = vertices[edge.index() & 15];
+                }
+            }
+            end += 3 * TRIANGLE_COUNTS[case] as usize;
+        }
     }
-    case as usize
+    end
+}
+
+/// The 33 signs of the cells of group `group`; higher bits mean nothing.
+#[inline(always)]
+fn group_signs(row: &[u64], group: usize) -> u64 {
+    let word = row[group / 2];
+    if group.is_multiple_of(2) { word } else { word >> 32 | row.get(group / 2 + 1).map_or(0, |next| next << 32) }
 }
 
 /// The next vertex on each edge of the cells of a row.
@@ -74,38 +83,49 @@ fn case_index(low: &[u64; 4], high: &[u64; 4], x: usize) -> usize {
 struct NextVertex {
     /// On edges 0 to 3.
     x: [u32; 4],
-    /// On edges 4 and 6.
-    y: [u32; 2],
-    /// On edges 8 and 10.
-    z: [u32; 2],
+    /// On edges 4, 6, 8 and 10.
+    low: [u32; 4],
 }
 
 impl NextVertex {
-    fn new(rows: [Row; 4]) -> Self {
+    fn new(rows: [&Row; 4]) -> Self {
         Self {
             x: rows.map(|row| row.first[0]),
-            y: [rows[0].first[1], rows[2].first[1]],
-            z: [rows[0].first[2], rows[1].first[2]],
+            low: [rows[0].first[1], rows[2].first[1], rows[0].first[2], rows[1].first[2]],
         }
     }
 
-    /// The vertices on the twelve edges of the next active cell, which crosses the edges `crossed`; those of other
-    /// edges mean nothing. (Sixteen, so that a masked index needs no check.)
+    /// The vertices on the twelve edges of the next active cell, a cell of `case`; those of edges that it does not
+    /// cross mean nothing. (Sixteen, so that a masked index needs no check.)
     #[inline(always)]
-    fn advance(&mut self, crossed: u16) -> [u32; 16] {
-        let has = |edge: u32| u32::from(crossed >> edge & 1);
-        let y = [self.y[0] + has(4), self.y[1] + has(6)];
-        let z = [self.z[0] + has(8), self.z[1] + has(10)];
-        let vertices = [
-            self.x[0], self.x[1], self.x[2], self.x[3], //
-            self.y[0], y[0], self.y[1], y[1], //
-            self.z[0], z[0], self.z[1], z[1], //
-            0, 0, 0, 0,
-        ];
-        for (edge, next) in self.x.iter_mut().enumerate() {
-            *next += has(edge as u32);
+    fn advance(&mut self, case: usize) -> [u32; 16] {
+        let (step_x, step_low) = &STEPS[case];
+        let (x, low) = (self.x, self.low);
+        for edge in 0..4 {
+            self.x[edge] += step_x[edge];
+            self.low[edge] += step_low[edge];
         }
-        (self.y, self.z) = (y, z);
-        vertices
+        let high = self.low;
+        [
+            x[0], x[1], x[2], x[3], //
+            low[0], high[0], low[1], high[1], //
+            low[2], high[2], low[3], high[3], //
+            0, 0, 0, 0,
+        ]
     }
 }
+
+/// How far a cell of each case advances the counters.
+static STEPS: [([u32; 4], [u32; 4]); 256] = {
+    let (mut steps, mut case) = ([([0; 4], [0; 4]); 256], 0);
+    while case < 256 {
+        let mut edge = 0;
+        while edge < 4 {
+            steps[case].0[edge] = (CROSSED_EDGES[case] >> edge & 1) as u32;
+            steps[case].1[edge] = (CROSSED_EDGES[case] >> (4 + 2 * edge) & 1) as u32;
+            edge += 1;
+        }
+        case += 1;
+    }
+    steps
+};

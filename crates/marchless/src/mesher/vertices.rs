@@ -1,5 +1,7 @@
 //! Pass 3: one vertex for each crossing, with its position, normal and material.
 
+use core::slice;
+
 use super::{
     Layout, MeshSettings,
     crossings::{Row, RowCrossings},
@@ -33,21 +35,26 @@ pub(super) fn place<W: Weight>(
         out.materials.resize(vertex_count, 0);
     }
     let mut pass = Vertices {
-        weights: samples.weights(),
-        materials: samples.materials(),
+        samples,
         layout,
-        signs,
-        rows,
         isovalue: settings.isovalue * W::SCALE,
-        vertex: 0,
-        out,
+        positions: out.positions.iter_mut(),
+        normals: out.normals.iter_mut(),
+        materials: out.materials.iter_mut(),
     };
-    if samples.is_padded() {
-        pass.run::<true>();
-    } else {
-        pass.run::<false>();
+    for z in 0..layout.size[2] {
+        for y in 0..layout.size[1] {
+            if !rows[y + z * layout.size[1]].is_empty() {
+                let crossings = RowCrossings::new(layout, signs, y, z);
+                if samples.is_padded() {
+                    pass.row::<true>(&crossings, y, z);
+                } else {
+                    pass.row::<false>(&crossings, y, z);
+                }
+            }
+        }
     }
-    debug_assert_eq!(pass.vertex, vertex_count);
+    debug_assert_eq!(pass.positions.len(), 0);
     out.bounds = bounds(&out.positions);
 }
 
@@ -59,127 +66,143 @@ pub(crate) fn crossing_fraction<W: Weight>(a: W, b: W, isovalue: f32) -> f32 {
     if fraction > MARGIN { fraction.min(1.0 - MARGIN) } else { MARGIN }
 }
 
+/// The pass, with what is still to be filled.
 struct Vertices<'a, W> {
-    weights: &'a [W],
-    materials: Option<&'a [u8]>,
+    samples: &'a Samples<'a, W>,
     layout: &'a Layout,
-    signs: &'a [u64],
-    rows: &'a [Row],
     /// In steps.
     isovalue: f32,
-    /// The next vertex.
-    vertex: usize,
-    out: &'a mut MeshBuffer,
+    positions: slice::IterMut<'a, [f32; 3]>,
+    normals: slice::IterMut<'a, [f32; 3]>,
+    materials: slice::IterMut<'a, u8>,
 }
 
 impl<W: Weight> Vertices<'_, W> {
-    fn run<const PADDED: bool>(&mut self) {
-        let layout = self.layout;
-        for z in 0..layout.size[2] {
-            for y in 0..layout.size[1] {
-                if self.rows[y + z * layout.size[1]].is_empty() {
-                    continue;
-                }
-                let crossings = RowCrossings::new(layout, self.signs, y, z);
-                self.row::<PADDED, 0>(&crossings, y, z);
-                self.row::<PADDED, 1>(&crossings, y, z);
-                self.row::<PADDED, 2>(&crossings, y, z);
-            }
+    #[inline(always)]
+    fn row<const PADDED: bool>(&mut self, crossings: &RowCrossings<'_>, y: usize, z: usize) {
+        let low = Surroundings::<W, PADDED>::new(self.samples, self.layout, y, z);
+        self.edges::<PADDED, 0>(crossings, &low, &low, y, z);
+        if y + 1 < self.layout.size[1] {
+            let high = Surroundings::new(self.samples, self.layout, y + 1, z);
+            self.edges::<PADDED, 1>(crossings, &low, &high, y, z);
+        }
+        if z + 1 < self.layout.size[2] {
+            let high = Surroundings::new(self.samples, self.layout, y, z + 1);
+            self.edges::<PADDED, 2>(crossings, &low, &high, y, z);
         }
     }
 
+    /// The vertices on the row's edges along `AXIS`; `low` and `high`: the rows of their ends.
     #[inline(always)]
-    fn row<const PADDED: bool, const AXIS: usize>(&mut self, crossings: &RowCrossings<'_>, y: usize, z: usize) {
-        let layout = self.layout;
-        let start = layout.row_start(y, z);
-        let inside = layout.row(self.signs, y + z * layout.size[1]);
-        let mut low_slopes = Slopes::new::<PADDED>(layout, y, z);
-        let mut high_slopes = Slopes::new::<PADDED>(layout, y + usize::from(AXIS == 1), z + usize::from(AXIS == 2));
-        for (word, &inside) in inside.iter().enumerate() {
+    fn edges<const PADDED: bool, const AXIS: usize>(
+        &mut self,
+        crossings: &RowCrossings<'_>,
+        low: &Surroundings<'_, W, PADDED>,
+        high: &Surroundings<'_, W, PADDED>,
+        y: usize,
+        z: usize,
+    ) {
+        for word in 0..self.layout.words {
+            let inside = crossings.signs(word);
             for bit in set_bits(crossings.word(word)[AXIS]) {
                 let x = word * 64 + bit;
-                let low = start + x;
-                let high = low + layout.strides[AXIS];
-                let fraction = crossing_fraction(self.weights[low], self.weights[high], self.isovalue);
-                let mut position = [x as f32, y as f32, z as f32];
-                position[AXIS] += fraction;
-                self.out.positions[self.vertex] = position;
+                let high_x = x + usize::from(AXIS == 0);
+                let fraction = crossing_fraction(low.weight(x), high.weight(high_x), self.isovalue);
                 let low_is_inside = inside >> bit & 1 == 1;
-                if let Some(normal) = self.out.normals.get_mut(self.vertex) {
-                    if !PADDED {
-                        low_slopes.set(layout, 0, x);
-                        high_slopes.set(layout, 0, x + usize::from(AXIS == 0));
-                    }
-                    let a = low_slopes.gradient::<PADDED, W>(self.weights, low);
-                    let b = high_slopes.gradient::<PADDED, W>(self.weights, high);
-                    *normal = match unit(mix(a, b, fraction)) {
+                if let Some(position) = self.positions.next() {
+                    *position = [x as f32, y as f32, z as f32];
+                    position[AXIS] += fraction;
+                }
+                if let Some(normal) = self.normals.next() {
+                    *normal = match unit(mix(low.gradient(x), high.gradient(high_x), fraction)) {
                         Some(normal) => normal,
                         None => {
-                            let a = low_slopes.steady_gradient(self.weights, low);
-                            let b = high_slopes.steady_gradient(self.weights, high);
                             let mut fallback = [0.0; 3];
                             fallback[AXIS] = if low_is_inside { 1.0 } else { -1.0 };
-                            steady_unit(a, b, fraction, fallback)
+                            steady_unit(low.steady_gradient(x), high.steady_gradient(high_x), fraction, fallback)
                         }
                     };
                 }
-                if let Some(materials) = self.materials {
-                    self.out.materials[self.vertex] = materials[if low_is_inside { low } else { high }];
+                if let (Some(material), Some(materials)) = (self.materials.next(), self.samples.materials()) {
+                    let low_index = self.layout.row_start(y, z) + x;
+                    let high_index = low_index + self.layout.strides[AXIS];
+                    *material = materials[if low_is_inside { low_index } else { high_index }];
                 }
-                self.vertex += 1;
             }
         }
     }
 }
 
-/// Which neighbours of a sample its gradient reads: how far below and above it along each axis they lie in memory, and the
-/// factor that makes one-sided differences comparable to central ones, which span twice the distance.
-struct Slopes {
-    below: [usize; 3],
-    above: [usize; 3],
-    scale: [f32; 3],
+/// A row of samples and the four rows around it, from which the gradients on it are made. All slices start with the first sample
+/// that is given, padding or not, and are equally long.
+struct Surroundings<'a, W, const PADDED: bool> {
+    row: &'a [W],
+    below: [&'a [W]; 2],
+    above: [&'a [W]; 2],
+    /// What makes one-sided differences comparable to central ones, which span twice the distance.
+    scale: [f32; 2],
 }
 
-impl Slopes {
-    /// For the samples of row `y`, `z`.
+impl<'a, W: Weight, const PADDED: bool> Surroundings<'a, W, PADDED> {
     #[inline(always)]
-    fn new<const PADDED: bool>(layout: &Layout, y: usize, z: usize) -> Self {
-        let mut slopes = Self { below: layout.strides, above: layout.strides, scale: [1.0; 3] };
-        if !PADDED {
-            slopes.set(layout, 1, y);
-            slopes.set(layout, 2, z);
-        }
-        slopes
-    }
-
-    /// Reads one-sided differences along `axis` where `at` lies at the border.
-    #[inline(always)]
-    fn set(&mut self, layout: &Layout, axis: usize, at: usize) {
-        let (first, last) = (at == 0, at + 1 >= layout.size[axis]);
-        self.below[axis] = if first { 0 } else { layout.strides[axis] };
-        self.above[axis] = if last { 0 } else { layout.strides[axis] };
-        self.scale[axis] = if first | last { 2.0 } else { 1.0 };
-    }
-
-    /// Twice the gradient at sample `index`.
-    #[inline(always)]
-    fn gradient<const PADDED: bool, W: Weight>(&self, weights: &[W], index: usize) -> [f32; 3] {
-        let mut gradient = [0.0; 3];
-        for (axis, slope) in gradient.iter_mut().enumerate() {
-            *slope = weights[index + self.above[axis]].raw() - weights[index - self.below[axis]].raw();
-            if !PADDED {
-                *slope *= self.scale[axis];
+    fn new(samples: &Samples<'a, W>, layout: &Layout, y: usize, z: usize) -> Self {
+        let len = layout.size[0] + 2 * usize::from(PADDED);
+        let start = layout.row_start(y, z) - usize::from(PADDED);
+        let row = |start: usize| &samples.weights()[start..][..len];
+        let mut around = Self { row: row(start), below: [row(start); 2], above: [row(start); 2], scale: [1.0; 2] };
+        for (index, (axis, at)) in [(1, y), (2, z)].into_iter().enumerate() {
+            let (first, last) = (!PADDED && at == 0, !PADDED && at + 1 == layout.size[axis]);
+            if !first {
+                around.below[index] = row(start - layout.strides[axis]);
+            }
+            if !last {
+                around.above[index] = row(start + layout.strides[axis]);
+            }
+            if first || last {
+                around.scale[index] = 2.0;
             }
         }
-        gradient
+        around
+    }
+
+    /// The weight of the row's meshed sample `x`.
+    #[inline(always)]
+    fn weight(&self, x: usize) -> W {
+        self.row[x + usize::from(PADDED)]
+    }
+
+    /// Twice the gradient at sample `x`.
+    #[inline(always)]
+    fn gradient(&self, x: usize) -> [f32; 3] {
+        let (low, at, high) = self.span(x);
+        let gradient = [
+            W::difference(self.row[high], self.row[low]),
+            W::difference(self.above[0][at], self.below[0][at]),
+            W::difference(self.above[1][at], self.below[1][at]),
+        ];
+        if PADDED {
+            return gradient;
+        }
+        let x_scale = if high - low == 1 { 2.0 } else { 1.0 };
+        [gradient[0] * x_scale, gradient[1] * self.scale[0], gradient[2] * self.scale[1]]
     }
 
     /// The same, where differences may overflow.
-    fn steady_gradient<W: Weight>(&self, weights: &[W], index: usize) -> [f64; 3] {
-        [0, 1, 2].map(|axis| {
-            let slope = weights[index + self.above[axis]].finite() - weights[index - self.below[axis]].finite();
-            slope * f64::from(self.scale[axis])
-        })
+    #[cold]
+    fn steady_gradient(&self, x: usize) -> [f64; 3] {
+        let (low, at, high) = self.span(x);
+        let x_scale = if high - low == 1 { 2.0 } else { 1.0 };
+        [
+            (self.row[high].finite() - self.row[low].finite()) * x_scale,
+            (self.above[0][at].finite() - self.below[0][at].finite()) * f64::from(self.scale[0]),
+            (self.above[1][at].finite() - self.below[1][at].finite()) * f64::from(self.scale[1]),
+        ]
+    }
+
+    /// Where in the slices sample `x` and its neighbours along x are; at an open border, itself.
+    #[inline(always)]
+    fn span(&self, x: usize) -> (usize, usize, usize) {
+        if PADDED { (x, x + 1, x + 2) } else { (x.saturating_sub(1), x, (x + 1).min(self.row.len() - 1)) }
     }
 }
 
