@@ -65,7 +65,7 @@ fn chunk<W: Random>(field: Field, seed: u64, region: Region) -> Chunk<W> {
         }
     };
     if let Field::Uniform = field {
-        let inside = hash(seed, region.min) % 3 > 0;
+        let inside = hash(seed, region.min) % 3 < 2;
         return Chunk::Uniform(Voxel::new(if inside { W::INSIDE } else { W::OUTSIDE }, inside as u8));
     }
     let weights = region.points().map(weight).collect();
