@@ -208,6 +208,7 @@ impl Plugin for BrushPlugin {
             .add_message::<TerrainEdited>()
             .register_type::<Stamp>()
             .register_type::<TerrainEdited>()
+            .register_type::<crate::query::TerrainHit>()
             .init_resource::<apply::StampQueue>()
             .add_systems(PostUpdate, apply::read_stamps.in_set(MarchlessSystems::ReadStamps))
             .add_systems(PostUpdate, (apply::apply_stamps, apply::report_edits).chain().in_set(MarchlessSystems::Edit));

@@ -1,1 +1,128 @@
-//! TODO
+//! [`TerrainQuery`]: what a ray hits, how far away the surface is.
+
+use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemParam;
+use bevy_math::{DVec3, Ray3d, Vec3};
+use bevy_reflect::prelude::*;
+use bevy_transform::components::GlobalTransform;
+
+use crate::terrain::TerrainVolume;
+
+/// Questions to all terrains, in world space.
+///
+/// Terrains are where they were when transforms were last propagated, and rays hit what is drawn, not what is about to be.
+///
+/// ```
+/// use bevy_marchless::prelude::*;
+/// # use bevy_ecs::prelude::*;
+/// # use bevy_math::{Dir3, Ray3d, Vec3};
+///
+/// fn dig_below(terrains: TerrainQuery, mut stamps: MessageWriter<Stamp>) {
+///     let down = Ray3d::new(Vec3::new(50.0, 200.0, 50.0), Dir3::NEG_Y);
+///     if let Some(hit) = terrains.ray_cast(down, 500.0) {
+///         stamps.write(Stamp::dig(hit.terrain, BrushShape::sphere(hit.lattice, 4.0)));
+///     }
+/// }
+/// ```
+#[derive(SystemParam)]
+pub struct TerrainQuery<'w, 's> {
+    terrains: Query<'w, 's, (Entity, &'static TerrainVolume, &'static GlobalTransform)>,
+}
+
+/// Where a ray hits a terrain.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq, Clone)]
+pub struct TerrainHit {
+    /// The terrain's entity.
+    pub terrain: Entity,
+    /// The entity of the chunk whose triangle was hit.
+    pub chunk: Entity,
+    /// Where, in world space.
+    pub position: Vec3,
+    /// The triangle's unit normal in world space, to the outside.
+    pub normal: Vec3,
+    /// Where, in voxels from the terrain's lowest corner, as stamps want it.
+    pub lattice: Vec3,
+    /// What the nearest corner of the triangle is made of.
+    pub material: u8,
+    /// How far from the ray's origin, in world units.
+    pub distance: f32,
+}
+
+impl TerrainQuery<'_, '_> {
+    /// The first triangle that a ray hits, of any terrain and from either side. `max_distance`: in world units.
+    pub fn ray_cast(&self, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
+        let hits = self.terrains.iter().filter_map(|found| cast(found, ray, max_distance));
+        hits.min_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+
+    /// The same of one terrain.
+    pub fn ray_cast_terrain(&self, terrain: Entity, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
+        cast(self.terrains.get(terrain).ok()?, ray, max_distance)
+    }
+
+    /// The weight at a position in world space, in voxels, negative inside, with all edits; interpolated between samples.
+    ///
+    /// `None` where there is no such terrain, or the chunk there is not filled yet. Outside of the terrain's extent is air.
+    pub fn weight_at(&self, terrain: Entity, position: Vec3) -> Option<f32> {
+        let (_, volume, _) = self.terrains.get(terrain).ok()?;
+        let lattice = self.to_lattice(terrain, position)?;
+        let chunk = volume.grid.chunk_of(lattice.floor().as_ivec3().to_array());
+        if volume.chunks.get(&chunk).is_some_and(|state| !state.is_filled()) {
+            return None;
+        }
+        marchless::weight_at(&volume.grid, lattice.as_dvec3().to_array())
+    }
+
+    /// A position in world space in voxels from the terrain's lowest corner, as stamps want it.
+    pub fn to_lattice(&self, terrain: Entity, position: Vec3) -> Option<Vec3> {
+        let (_, volume, transform) = self.terrains.get(terrain).ok()?;
+        let lattice = transform.affine().inverse().transform_point3(position) / volume.settings()?.voxel_size;
+        lattice.is_finite().then_some(lattice)
+    }
+
+    /// A position in voxels from the terrain's lowest corner, in world space.
+    pub fn to_world(&self, terrain: Entity, lattice: Vec3) -> Option<Vec3> {
+        let (_, volume, transform) = self.terrains.get(terrain).ok()?;
+        Some(transform.transform_point(lattice * volume.settings()?.voxel_size))
+    }
+}
+
+fn cast(
+    (terrain, volume, transform): (Entity, &TerrainVolume, &GlobalTransform),
+    ray: Ray3d,
+    max_distance: f32,
+) -> Option<TerrainHit> {
+    let voxel_size = volume.settings()?.voxel_size;
+    let to_world = transform.affine();
+    let to_local = to_world.inverse();
+    let origin = (to_local.transform_point3(ray.origin) / voxel_size).as_dvec3();
+    let step = (to_local.transform_vector3(*ray.direction) / voxel_size).as_dvec3();
+    // Voxels per world unit along the ray.
+    let scale = step.length();
+    let direction = step / scale;
+    let reach = f64::from(max_distance) * scale;
+    let mut start = 0.0;
+    loop {
+        let from = origin + direction * start;
+        let (shown, isovalue) = (&volume.shown, volume.shown_isovalue);
+        let hit = marchless::ray_cast(shown, isovalue, from.to_array(), direction.to_array(), reach - start)?;
+        let drawn = volume.chunks.get(&hit.chunk).filter(|state| state.drawn).and_then(|state| state.entity);
+        let Some(chunk) = drawn else {
+            // The samples of a chunk that is not drawn yet, known for the sake of its neighbours: on behind them.
+            start += hit.distance + 1e-3;
+            continue;
+        };
+        let lattice = DVec3::from(hit.position).as_vec3();
+        let normal = to_world.matrix3.inverse().transpose() * Vec3::from(hit.normal);
+        return Some(TerrainHit {
+            terrain,
+            chunk,
+            position: to_world.transform_point3(lattice * voxel_size),
+            normal: normal.normalize_or_zero(),
+            lattice,
+            material: hit.material,
+            distance: ((start + hit.distance) / scale) as f32,
+        });
+    }
+}

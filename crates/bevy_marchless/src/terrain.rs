@@ -18,6 +18,7 @@ use marchless::{DEFAULT_CHUNK_CELLS, MeshSettings, Source};
 use thiserror::Error;
 
 pub(crate) use fill::distance_to_middle;
+pub(crate) use prepare::prepare_terrains;
 pub use volume::TerrainVolume;
 pub(crate) use volume::{Group, Pending, around};
 
@@ -310,7 +311,7 @@ impl Plugin for TerrainPlugin {
             .register_type::<ChunkGeometry>()
             .init_resource::<fill::FillResults>()
             .add_observer(prepare::forget_despawned_chunk)
-            .add_systems(PostUpdate, prepare::prepare_terrains.in_set(MarchlessSystems::Prepare))
+            .add_systems(PostUpdate, prepare_terrains.in_set(MarchlessSystems::Prepare))
             .add_systems(PostUpdate, fill::take_filled_chunks.in_set(MarchlessSystems::Fill));
     }
 }

@@ -74,12 +74,6 @@ impl WorkQueue {
         state.jobs.push(Job { order, claimed: claimed.clone(), run: Box::new(run) });
         Ticket(claimed)
     }
-
-    /// How many jobs wait whose priority is `counted`.
-    pub(crate) fn waiting(&self, counted: impl Fn(Priority) -> bool) -> usize {
-        let state = self.0.lock();
-        state.jobs.iter().filter(|job| counted(job.order.0.0) && !job.claimed.load(Relaxed)).count()
-    }
 }
 
 impl Drop for WorkQueue {
@@ -228,9 +222,7 @@ mod tests {
         let (queue, mut tickets, results) = queue_of(&[Priority::Fill(0), Priority::Fill(1), Priority::Fill(2)]);
         run(queue.0.take().unwrap());
         assert!(!tickets.remove(0).withdraw(), "it has run");
-        assert_eq!(queue.waiting(|_| true), 2);
         drop(tickets.remove(0));
-        assert_eq!(queue.waiting(|_| true), 1);
         run(queue.0.take().unwrap());
         assert!(queue.0.take().is_none());
         assert_eq!(results.take(), [Priority::Fill(0), Priority::Fill(2)]);

@@ -155,6 +155,13 @@ impl TerrainVolume {
         self.is_filled() && self.ready.is_empty() && self.pending.is_empty() && self.groups.is_empty()
     }
 
+    /// How many chunks can be meshed, or are being meshed.
+    pub(crate) fn waiting_for_meshes(&self) -> usize {
+        let pending = self.pending.iter().map(|pending| pending.chunks.len());
+        let in_groups = self.groups.values().map(|group| group.members - group.meshed.len());
+        self.ready.len() + pending.sum::<usize>() + in_groups.sum::<usize>()
+    }
+
     /// Notes that chunks have changed; sets that overlap become one.
     pub(crate) fn add_pending(&mut self, mut chunks: BTreeSet<[i32; 3]>, mut since: Option<Since>) {
         if chunks.is_empty() {

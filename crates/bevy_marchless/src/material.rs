@@ -1,0 +1,101 @@
+//! [`TerrainMaterialPlugin`]: chunks are drawn with the `MeshMaterial3d` of their terrain.
+
+use core::marker::PhantomData;
+
+use bevy_app::{App, Plugin, PostUpdate};
+use bevy_asset::{Assets, Handle};
+use bevy_ecs::component::ComponentId;
+use bevy_ecs::prelude::*;
+use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
+
+use crate::chunk::Chunk;
+use crate::schedule::MarchlessSystems;
+use crate::terrain::Terrain;
+
+/// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes.
+///
+/// [`MaterialPlugin`] adds it for [`StandardMaterial`]; add it for each other type of material that terrains have.
+pub struct TerrainMaterialPlugin<M: Material>(PhantomData<M>);
+
+impl<M: Material> Default for TerrainMaterialPlugin<M> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
+    fn build(&self, app: &mut App) {
+        let component = app.world_mut().register_component::<MeshMaterial3d<M>>();
+        app.init_resource::<MaterialTypes>();
+        app.world_mut().resource_mut::<MaterialTypes>().0.push(component);
+        app.add_observer(take_away_material::<M>).add_systems(
+            PostUpdate,
+            hand_on_material::<M>
+                .in_set(MarchlessSystems::Prepare)
+                .after(crate::terrain::prepare_terrains)
+                .after(give_default_material),
+        );
+    }
+}
+
+/// Draws terrains with [`StandardMaterial`]: their own, or a plain one where they have none.
+#[derive(Default)]
+pub struct MaterialPlugin;
+
+impl Plugin for MaterialPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins(TerrainMaterialPlugin::<StandardMaterial>::default())
+            .add_systems(PostUpdate, give_default_material.in_set(MarchlessSystems::Prepare));
+    }
+}
+
+/// The material components that some [`TerrainMaterialPlugin`] hands on.
+#[derive(Resource, Default)]
+struct MaterialTypes(Vec<ComponentId>);
+
+/// Gives terrains without any material a plain one, which shows the palette's colours.
+fn give_default_material(
+    terrains: Query<EntityRef, Added<Terrain>>,
+    types: Res<MaterialTypes>,
+    assets: Option<ResMut<Assets<StandardMaterial>>>,
+    mut plain: Local<Option<Handle<StandardMaterial>>>,
+    mut commands: Commands,
+) {
+    let Some(mut assets) = assets else { return };
+    for terrain in &terrains {
+        if !types.0.iter().any(|component| terrain.contains_id(*component)) {
+            let make = || assets.add(StandardMaterial { perceptual_roughness: 0.9, ..StandardMaterial::default() });
+            let material = plain.get_or_insert_with(make).clone();
+            commands.entity(terrain.id()).insert(MeshMaterial3d(material));
+        }
+    }
+}
+
+/// Gives the chunks of changed terrains, and new chunks, their terrain's material.
+fn hand_on_material<M: Material>(
+    chunks: Query<(Entity, Ref<Chunk>)>,
+    terrains: Query<Ref<MeshMaterial3d<M>>, With<Terrain>>,
+    mut commands: Commands,
+) {
+    for (entity, chunk) in &chunks {
+        if let Ok(material) = terrains.get(chunk.terrain)
+            && (chunk.is_added() || material.is_changed())
+        {
+            commands.entity(entity).insert(MeshMaterial3d(material.0.clone()));
+        }
+    }
+}
+
+/// Chunks lose their material when their terrain does.
+fn take_away_material<M: Material>(
+    removed: On<Remove, MeshMaterial3d<M>>,
+    terrains: Query<(), With<Terrain>>,
+    chunks: Query<(Entity, &Chunk)>,
+    mut commands: Commands,
+) {
+    if terrains.contains(removed.entity) {
+        for (entity, _) in chunks.iter().filter(|(_, chunk)| chunk.terrain == removed.entity) {
+            commands.entity(entity).try_remove::<MeshMaterial3d<M>>();
+        }
+    }
+}
