@@ -1,1 +1,10 @@
-//! wip
+//! What the examples share: a camera to fly with, a look (sky, light, fog, colours), pictures without a window, and
+//! what to do where there is no screen.
+
+pub mod camera;
+pub mod graphics;
+pub mod ground;
+pub mod look;
+pub mod picture;
+pub mod sky;
+pub mod small;

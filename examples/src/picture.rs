@@ -1,0 +1,96 @@
+//! [`PicturePlugin`]: renders one picture without a window and exits.
+
+use std::path::PathBuf;
+
+use bevy::app::{PluginGroupBuilder, ScheduleRunnerPlugin};
+use bevy::camera::RenderTarget;
+use bevy::image::Image;
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::render_resource::TextureFormat;
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+
+/// `DefaultPlugins` for a window of that title.
+pub fn window_plugins(title: &str) -> PluginGroupBuilder {
+    let window = Window { title: title.to_owned(), ..default() };
+    DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() })
+}
+
+/// `DefaultPlugins` without a window. Shaders are compiled before the frame that needs them, so that no frame lacks
+/// anything.
+pub fn picture_plugins() -> PluginGroupBuilder {
+    DefaultPlugins
+        .build()
+        .disable::<WinitPlugin>()
+        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+        .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+        .add(ScheduleRunnerPlugin::default())
+}
+
+/// Renders what the first 3-D camera sees into a picture file, and exits: with success once it is written, with an
+/// error where that fails.
+///
+/// The picture is taken some frames after [`PictureReady`] becomes true; until then nothing is rendered.
+pub struct PicturePlugin {
+    /// Where to write it; the name's ending says which format.
+    pub path: PathBuf,
+    /// Width and height. [Units: pixels]
+    pub size: UVec2,
+}
+
+/// Set this to true when the scene is complete.
+#[derive(Resource, Default)]
+pub struct PictureReady(pub bool);
+
+#[derive(Resource)]
+struct Picture {
+    path: PathBuf,
+    target: Handle<Image>,
+    frames: u32,
+}
+
+/// How many frames are rendered before the one that is taken, so that all buffers and textures have arrived.
+const WARM_UP: u32 = 2;
+
+impl Plugin for PicturePlugin {
+    fn build(&self, app: &mut App) {
+        let target = Image::new_target_texture(self.size.x, self.size.y, TextureFormat::Rgba8UnormSrgb, None);
+        let target = app.world_mut().resource_mut::<Assets<Image>>().add(target);
+        app.init_resource::<PictureReady>()
+            .insert_resource(Picture { path: self.path.clone(), target, frames: 0 })
+            .add_observer(aim_camera)
+            .add_systems(Last, take_picture.run_if(|ready: Res<PictureReady>| ready.0));
+    }
+}
+
+fn aim_camera(event: On<Add, Camera3d>, picture: Res<Picture>, mut commands: Commands) {
+    let target = RenderTarget::Image(picture.target.clone().into());
+    commands.entity(event.entity).insert((target, Camera { is_active: false, ..default() }));
+}
+
+fn take_picture(mut commands: Commands, mut picture: ResMut<Picture>, mut cameras: Query<&mut Camera, With<Camera3d>>) {
+    for mut camera in &mut cameras {
+        camera.is_active = true;
+    }
+    if picture.frames == WARM_UP {
+        commands.spawn(Screenshot::image(picture.target.clone())).observe(save_and_exit);
+    }
+    picture.frames += 1;
+}
+
+fn save_and_exit(captured: On<ScreenshotCaptured>, picture: Res<Picture>, mut exit: MessageWriter<AppExit>) {
+    let image = captured.image.clone().try_into_dynamic().map_err(|error| error.to_string());
+    let saved = image.and_then(|image| image.to_rgb8().save(&picture.path).map_err(|error| error.to_string()));
+    exit.write(match saved {
+        Ok(()) => {
+            println!("Wrote {}.", picture.path.display());
+            AppExit::Success
+        }
+        Err(error) => {
+            eprintln!("The picture {} cannot be written: {error}.", picture.path.display());
+            AppExit::error()
+        }
+    });
+}
