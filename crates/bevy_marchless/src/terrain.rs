@@ -35,7 +35,7 @@ use crate::source::Air;
 /// other settings only meshes it anew. Settings out of range are refused with an error in the log and a
 /// [`TerrainError`] component; those before them stay in effect.
 ///
-/// Outside of its extent there is air, so that its surface is closed, with walls half a voxel inside the border (where the isovalue is below 0.5).
+/// Outside of its extent there is air, so that its surface is closed, with flat walls at its border.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;

@@ -10,7 +10,7 @@ mod tests;
 
 use crate::{
     cell::{CaseIndex, Corner, Edge},
-    grid::{Chunk, Grid},
+    grid::{Chunk, Grid, border::Border},
     lattice::Region,
     mesher::crossing_fraction,
     sample::{Voxel, Weight},
@@ -117,6 +117,8 @@ struct Surface<W: Weight> {
     /// Cells per axis.
     cells: i32,
     isovalue: f32,
+    /// The border of a bounded grid, where the isovalue raises it and the chunk's cells reach it.
+    border: Option<Border>,
 }
 
 impl<W: Weight> Surface<W> {
@@ -128,8 +130,16 @@ impl<W: Weight> Surface<W> {
             let absent = || Chunk::Uniform(grid.get(grid.chunk_region(position).min));
             grid.chunk(position).cloned().unwrap_or_else(absent)
         });
-        let origin = grid.chunk_region(position).min;
-        Self { position, origin, chunks, cells: grid.chunk_cells() as i32, isovalue }
+        let region = grid.chunk_region(position);
+        let border = grid.border().and_then(|border| border.raised(isovalue));
+        Self {
+            position,
+            origin: region.min,
+            chunks,
+            cells: grid.chunk_cells() as i32,
+            isovalue,
+            border: border.filter(|border| border.reaches(&region.grown(0, 1))),
+        }
     }
 
     /// Whether it is certain, without looking at single samples, that there are none.
@@ -140,7 +150,7 @@ impl<W: Weight> Surface<W> {
             Chunk::Samples(_) => None,
         };
         let first = inside(&self.chunks[0]);
-        first.is_some() && self.chunks.iter().all(|chunk| inside(chunk) == first)
+        self.border.is_none() && first.is_some() && self.chunks.iter().all(|chunk| inside(chunk) == first)
     }
 
     /// The nearest hit in `cell`.
@@ -183,7 +193,15 @@ impl<W: Weight> Surface<W> {
             }
             stride *= self.cells as usize;
         }
-        self.chunks[chunk].voxel(index)
+        let voxel = self.chunks[chunk].voxel(index);
+        match &self.border {
+            Some(border) => {
+                let offset = corner.offset();
+                let point = [0, 1, 2].map(|axis| self.origin[axis] + local[axis] + i32::from(offset[axis]));
+                Voxel { weight: border.clip(point, voxel.weight), ..voxel }
+            }
+            None => voxel,
+        }
     }
 
     /// The mesh's vertex on an edge of the cell at `local`, counted from the chunk's lowest point, bit for bit.

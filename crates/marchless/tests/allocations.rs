@@ -1,9 +1,10 @@
 //! Once its buffers are warm, meshing allocates nothing.
 
-use std::{
-    alloc::{GlobalAlloc, Layout, System},
+use core::{
+    alloc::{GlobalAlloc, Layout},
     cell::Cell,
 };
+use std::alloc::System;
 
 use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
 

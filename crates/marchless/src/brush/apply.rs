@@ -96,10 +96,7 @@ struct Pass {
 
 impl Pass {
     fn new(stamp: &Stamp, origin: [i32; 3], cells: u32, planes: Option<Region>, area: Region) -> Self {
-        // The points nearest to the border are those at two corners.
-        let ends = [area.min, area.max.map(|v| v - 1)];
-        let border = planes.map(Border::new);
-        let border = border.filter(|border| ends.iter().any(|&end| border.clip(end, -EDIT_LIMIT) > -EDIT_LIMIT));
+        let border = planes.map(Border::new).filter(|border| border.reaches(&area));
         Self { change: Change::new(stamp), origin, cells, area, border }
     }
 

@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::Chunk;
-use super::border::Border;
+use super::border::{Border, larger, layer_indices};
 use crate::buffer::MeshBuffer;
 use crate::lattice::{Samples, Shape};
 use crate::mesher::{MeshError, MeshSettings, Mesher};
@@ -28,8 +28,7 @@ const CENTRE: usize = 13;
 
 impl<W: Weight> Neighbourhood<W> {
     /// Whether it is certain, without looking at single samples, that the chunk has no surface: it lies beyond the
-    /// bounds, or all that its mesh reads is one weight. At the border of a bounded grid this holds for isovalues
-    /// up to half a voxel.
+    /// bounds, or all that its mesh reads is one weight (at the border of a bounded grid, the one farthest outside).
     pub fn is_uniform(&self) -> bool {
         let Some(Chunk::Uniform(first)) = &self.chunks[CENTRE] else {
             return self.chunks[CENTRE].is_none();
@@ -37,7 +36,7 @@ impl<W: Weight> Neighbourhood<W> {
         self.chunks.iter().all(|chunk| match chunk {
             Some(Chunk::Uniform(voxel)) => voxel.weight == first.weight,
             Some(Chunk::Samples(_)) => false,
-            None => first.weight >= W::from_voxels(0.5),
+            None => first.weight == W::OUTSIDE,
         })
     }
 
@@ -87,6 +86,9 @@ impl<W: Weight> Neighbourhood<W> {
             return Ok(());
         }
         self.block(block);
+        if let Some(border) = self.border.and_then(|border| border.raised(settings.isovalue)) {
+            block.clip(&border, self.origin.map(|v| v - 1));
+        }
         mesher.mesh(block.samples(), settings, out)
     }
 
@@ -120,6 +122,16 @@ impl<W: Weight> Block<W> {
             .and_then(|samples| samples.with_materials(&self.materials))
             .expect("a block's samples fill its shape")
             .padded()
+    }
+
+    /// Intersects the samples with a border. `origin`: the block's lowest lattice point.
+    fn clip(&mut self, border: &Border, origin: [i64; 3]) {
+        let size = self.shape.size()[0] as usize;
+        for (axis, layer, least) in border.layers::<W>(origin, size) {
+            for index in layer_indices(axis, layer, size) {
+                self.weights[index] = larger(self.weights[index], least);
+            }
+        }
     }
 
     /// Makes room for a chunk of `cells` cells per axis.

@@ -15,34 +15,48 @@ const DEPTH: i64 = 4;
 pub(crate) struct Border {
     min: [i64; 3],
     max: [i64; 3],
+    /// The isovalue at which the box lies where it does, in voxels.
+    isovalue: f32,
 }
 
 impl Border {
     /// `planes`: [`crate::Grid::planes`].
     pub(crate) fn new(planes: Region) -> Self {
-        Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from) }
+        Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from), isovalue: 0.0 }
+    }
+
+    /// The border that surfaces at `isovalue` need on top, so that beyond it all is outside for them too. `None` where the
+    /// samples as they are written suffice.
+    pub(crate) fn raised(self, isovalue: f32) -> Option<Self> {
+        (isovalue > 0.0).then_some(Self { isovalue, ..self })
+    }
+
+    /// Whether some point of `region` is clipped.
+    pub(crate) fn reaches(&self, region: &Region) -> bool {
+        // The points nearest to the planes are those at two corners.
+        let ends = [region.min, region.max.map(|v| v.saturating_sub(1))];
+        ends.iter().any(|end| self.depth(end.map(i64::from)) <= DEPTH)
     }
 
     /// What is read at a point that no chunk of the grid owns.
     pub(super) fn beyond<W: Weight>(&self, point: [i64; 3]) -> Voxel<W> {
-        Voxel::new(wall(self.depth(point)), 0)
+        Voxel::new(self.wall(self.depth(point)), 0)
     }
 
     /// `weight`, intersected with the box at `point`.
     pub(crate) fn clip<W: Weight>(&self, point: [i32; 3], weight: W) -> W {
         let depth = self.depth(point.map(i64::from));
-        if depth > DEPTH { weight } else { larger(weight, wall(depth)) }
+        if depth > DEPTH { weight } else { larger(weight, self.wall(depth)) }
     }
 
-    /// Every layer of a chunk that is clipped: its axis, its index along that axis, and the least weight in it.
-    ///
-    /// `origin`: the chunk's lowest lattice point.
-    pub(super) fn layers<W: Weight>(&self, origin: [i32; 3], cells: u32) -> impl Iterator<Item = (usize, u32, W)> {
+    /// Every layer of a cube of `size` samples per axis that is clipped: its axis, its index along that axis, and the
+    /// least weight in it. `origin`: the cube's lowest lattice point.
+    pub(super) fn layers<W: Weight>(&self, origin: [i64; 3], size: usize) -> impl Iterator<Item = (usize, usize, W)> {
         let border = *self;
         (0..3).flat_map(move |axis| {
-            (0..cells).filter_map(move |index| {
-                let depth = border.depth_along(axis, i64::from(origin[axis]) + i64::from(index));
-                (depth <= DEPTH).then(|| (axis, index, wall(depth)))
+            (0..size).filter_map(move |index| {
+                let depth = border.depth_along(axis, origin[axis] + index as i64);
+                (depth <= DEPTH).then(|| (axis, index, border.wall(depth)))
             })
         })
     }
@@ -55,15 +69,22 @@ impl Border {
     fn depth_along(&self, axis: usize, coordinate: i64) -> i64 {
         (coordinate - self.min[axis]).min(self.max[axis] - coordinate)
     }
+
+    /// The weight of the box itself, `depth` points inside of its nearest plane.
+    fn wall<W: Weight>(&self, depth: i64) -> W {
+        W::from_voxels(self.isovalue + 0.5 - depth as f32)
+    }
 }
 
-/// The weight of the box itself, `depth` points inside of its nearest plane.
-fn wall<W: Weight>(depth: i64) -> W {
-    W::from_voxels(0.5 - depth as f32)
+/// The indices of layer `layer` across `axis` of a cube of `size` samples per axis.
+pub(super) fn layer_indices(axis: usize, layer: usize, size: usize) -> impl Iterator<Item = usize> {
+    let strides = [1, size, size * size];
+    let [along, across] = [strides[(axis + 1) % 3], strides[(axis + 2) % 3]];
+    (0..size).flat_map(move |j| (0..size).map(move |i| layer * strides[axis] + i * along + j * across))
 }
 
 /// The maximum; NaN, which counts as outside, stays.
-fn larger<W: Weight>(a: W, b: W) -> W {
+pub(super) fn larger<W: Weight>(a: W, b: W) -> W {
     if a < b { b } else { a }
 }
 
@@ -73,12 +94,13 @@ mod tests {
 
     #[test]
     fn walls_are_exact_in_steps() {
+        let border = Border::new(Region::new([0; 3], [16; 3]));
         for depth in 0..=DEPTH {
-            assert_eq!(i64::from(wall::<i16>(depth)), 128 - 256 * depth);
-            assert_eq!(i64::from(wall::<i8>(depth)), 16 - 32 * depth);
+            assert_eq!(i64::from(border.wall::<i16>(depth)), 128 - 256 * depth);
+            assert_eq!(i64::from(border.wall::<i8>(depth)), 16 - 32 * depth);
         }
-        assert_eq!(wall::<i8>(-1), 48);
-        assert_eq!(wall::<i8>(i64::MIN / 2), i8::MAX);
+        assert_eq!(border.wall::<i8>(-1), 48);
+        assert_eq!(border.wall::<i8>(i64::MIN / 2), i8::MAX);
     }
 
     #[test]

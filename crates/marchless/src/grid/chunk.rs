@@ -4,7 +4,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::border::Border;
+use super::border::{Border, larger, layer_indices};
 use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS};
 use crate::sample::{Voxel, Weight};
 use crate::source::{Bound, Source, SourceRegion};
@@ -94,24 +94,17 @@ impl<W: Weight> Chunk<W> {
 
     /// Intersects the samples with the border of a bounded grid. `origin`: the chunk's lowest lattice point.
     pub(crate) fn clip(&mut self, origin: [i32; 3], cells: u32, border: &Border) {
-        let strides = [1, cells as usize, (cells as usize).pow(2)];
-        for (axis, layer, least) in border.layers::<W>(origin, cells) {
-            let [along, across] = [strides[(axis + 1) % 3], strides[(axis + 2) % 3]];
-            let start = layer as usize * strides[axis];
-            let indices = || {
-                (0..cells as usize).flat_map(move |j| (0..cells as usize).map(move |i| start + i * along + j * across))
-            };
+        let size = cells as usize;
+        for (axis, layer, least) in border.layers::<W>(origin.map(i64::from), size) {
             // Looking first leaves shared samples shared, and a uniform chunk uniform, where nothing changes.
             let below = match self {
                 Self::Uniform(voxel) => voxel.weight < least,
-                Self::Samples(samples) => indices().any(|index| samples.weights[index] < least),
+                Self::Samples(samples) => layer_indices(axis, layer, size).any(|index| samples.weights[index] < least),
             };
             if below {
                 let weights = &mut self.samples_mut(cells).weights;
-                for index in indices() {
-                    if weights[index] < least {
-                        weights[index] = least;
-                    }
+                for index in layer_indices(axis, layer, size) {
+                    weights[index] = larger(weights[index], least);
                 }
             }
         }
