@@ -4,7 +4,7 @@
 //! only ours are of length 1, and ours are closed with the neighbours' on all sides, where surface nets leave that to one
 //! side of each border.
 
-use std::{hint::black_box, time::Duration};
+use core::{hint::black_box, time::Duration};
 
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main, measurement::WallTime};
 use fast_surface_nets::{
