@@ -3,6 +3,7 @@
 //!
 //! The terrain is the default one of 8 × 4 × 8 chunks of 32 cells, filled with hills. Each stroke digs a ball
 //! into the surface and fills it again, so that the terrain stays as it is. Beside it stands an update in which nothing happens.
+
 use std::hint::black_box;
 
 use bevy_app::{App, TaskPoolPlugin};
