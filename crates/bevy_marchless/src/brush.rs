@@ -14,6 +14,7 @@ use marchless::BrushError;
 pub(crate) use apply::apply_waiting_stamps;
 
 use crate::schedule::MarchlessSystems;
+use crate::stats::count_update;
 
 /// One application of a brush to a terrain, asked for by a message.
 ///
@@ -210,7 +211,7 @@ impl Plugin for BrushPlugin {
             .register_type::<TerrainEdited>()
             .register_type::<crate::query::TerrainHit>()
             .init_resource::<apply::StampQueue>()
-            .add_systems(PostUpdate, apply::read_stamps.in_set(MarchlessSystems::ReadStamps))
+            .add_systems(PostUpdate, apply::read_stamps.after(count_update).in_set(MarchlessSystems::ReadStamps))
             .add_systems(PostUpdate, (apply::apply_stamps, apply::report_edits).chain().in_set(MarchlessSystems::Edit));
     }
 }

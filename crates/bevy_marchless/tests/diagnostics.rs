@@ -1,0 +1,41 @@
+//! Diagnostics tell what is going on.
+
+mod common;
+
+use bevy_app::App;
+use bevy_diagnostic::{DiagnosticPath, DiagnosticsStore};
+use bevy_marchless::prelude::*;
+use bevy_math::Vec3;
+use common::*;
+
+fn latest(app: &App, path: &DiagnosticPath) -> Option<f64> {
+    app.world().resource::<DiagnosticsStore>().get(path).expect("registered").value()
+}
+
+#[test]
+fn diagnostics_follow_the_work() {
+    let mut app = app();
+    let gate = Gate::default();
+    let held = gate.clone();
+    let source = move |p: [f64; 3]| {
+        held.pass();
+        p.map(|v| (v - 16.0) * (v - 16.0)).iter().sum::<f64>().sqrt() - 12.0
+    };
+    let terrain = app.world_mut().spawn(small(Terrain::new(source))).id();
+    app.update();
+    assert_eq!(latest(&app, &DebugPlugin::FILL_QUEUE), Some(8.0));
+    assert_eq!(latest(&app, &DebugPlugin::EDIT_UPDATES), None);
+    gate.open();
+    settle(&mut app, terrain);
+    assert_eq!(latest(&app, &DebugPlugin::FILL_QUEUE), Some(0.0));
+    assert_eq!(latest(&app, &DebugPlugin::MESH_QUEUE), Some(0.0));
+    assert_eq!(latest(&app, &DebugPlugin::CHUNKS), Some(8.0));
+    let triangles: usize = geometry(&mut app, terrain).iter().map(|(_, mesh)| mesh.triangle_count()).sum();
+    assert_eq!(latest(&app, &DebugPlugin::TRIANGLES), Some(triangles as f64));
+    assert!(latest(&app, &DebugPlugin::MESH_TIME).unwrap() > 0.0);
+
+    app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::splat(10.0), 5.0)));
+    app.update();
+    assert_eq!(latest(&app, &DebugPlugin::EDIT_UPDATES), Some(0.0), "shown in the update that read it");
+    assert!(latest(&app, &DebugPlugin::EDIT_TIME).unwrap() > 0.0);
+}

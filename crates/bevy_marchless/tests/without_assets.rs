@@ -1,0 +1,22 @@
+//! Without assets there is geometry all the same.
+
+mod common;
+
+use bevy_camera::primitives::Aabb;
+use bevy_ecs::prelude::*;
+use bevy_marchless::prelude::*;
+use bevy_math::Vec3;
+use bevy_mesh::Mesh3d;
+use common::*;
+
+#[test]
+fn a_server_has_geometry_without_assets() {
+    let mut app = bare_app();
+    let terrain = settled(&mut app, ball());
+    app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::splat(10.0), 6.0)));
+    app.update();
+    assert_drawn(&mut app, terrain);
+    assert!(report(&mut app, terrain).is_closed());
+    assert_eq!(app.world_mut().query::<&Mesh3d>().iter(app.world()).count(), 0);
+    assert_eq!(app.world_mut().query::<(&Chunk, &Aabb)>().iter(app.world()).count(), 8);
+}
