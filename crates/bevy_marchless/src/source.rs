@@ -29,6 +29,10 @@ mod height_map;
 #[cfg(feature = "noise")]
 mod noise;
 mod sdf;
+#[cfg_attr(
+    not(any(feature = "noise", feature = "png")),
+    expect(dead_code, reason = "only the sources of these features look at strata")
+)]
 mod strata;
 
 use bevy_app::App;
