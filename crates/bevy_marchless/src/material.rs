@@ -53,9 +53,14 @@ impl Plugin for MaterialPlugin {
 #[derive(Resource, Default)]
 struct MaterialTypes(Vec<ComponentId>);
 
-/// Gives terrains without any material a plain one, which shows the palette's colours.
+/// On terrains that have been given the plain material.
+#[derive(Component)]
+struct PlainMaterial;
+
+/// Gives terrains without any material a plain one, which shows the palette's colours, and takes it away when they get
+/// another.
 fn give_default_material(
-    terrains: Query<EntityRef, Added<Terrain>>,
+    terrains: Query<EntityRef, With<Terrain>>,
     types: Res<MaterialTypes>,
     assets: Option<ResMut<Assets<StandardMaterial>>>,
     mut plain: Local<Option<Handle<StandardMaterial>>>,
@@ -63,10 +68,13 @@ fn give_default_material(
 ) {
     let Some(mut assets) = assets else { return };
     for terrain in &terrains {
-        if !types.0.iter().any(|component| terrain.contains_id(*component)) {
+        let materials = types.0.iter().filter(|component| terrain.contains_id(**component)).count();
+        let mut entity = commands.entity(terrain.id());
+        if materials == 0 {
             let make = || assets.add(StandardMaterial { perceptual_roughness: 0.9, ..StandardMaterial::default() });
-            let material = plain.get_or_insert_with(make).clone();
-            commands.entity(terrain.id()).insert(MeshMaterial3d(material));
+            entity.insert((MeshMaterial3d(plain.get_or_insert_with(make).clone()), PlainMaterial));
+        } else if materials > 1 && terrain.contains::<PlainMaterial>() {
+            entity.remove::<(MeshMaterial3d<StandardMaterial>, PlainMaterial)>();
         }
     }
 }

@@ -11,6 +11,7 @@ mod handmade;
 mod job;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_asset::Assets;
@@ -22,6 +23,8 @@ use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
 pub use handmade::{ChunkSamples, ChunkSamplesError};
 pub(crate) use job::{Colors, Meshed};
 use job::{MeshJob, mesh_now};
+
+use marchless::Chunk;
 
 use crate::chunk::{ChunkGeometry, mesh_bounds};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
@@ -218,7 +221,8 @@ fn show_group(volume: &mut TerrainVolume, group: Group, screen: &mut Screen) {
     }
     for (position, chunk) in group.snapshot {
         let is_drawn = volume.chunks.get(&position).is_some_and(|state| state.drawn);
-        if group.chunks.contains(&position) || !is_drawn {
+        let is_new = || !volume.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk));
+        if (group.chunks.contains(&position) || !is_drawn) && is_new() {
             volume.shown.insert(position, chunk).expect("a chunk of the same extent");
         }
     }
@@ -226,5 +230,14 @@ fn show_group(volume: &mut TerrainVolume, group: Group, screen: &mut Screen) {
     volume.shown_isovalue = group.isovalue;
     if let Some(since) = group.since {
         screen.stats.edit_is_visible(since);
+    }
+}
+
+/// Whether two chunks are known to be the same without looking at their samples.
+fn same_samples(a: &Chunk<i16>, b: &Chunk<i16>) -> bool {
+    match (a, b) {
+        (Chunk::Uniform(a), Chunk::Uniform(b)) => a == b,
+        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
+        _ => false,
     }
 }

@@ -1,9 +1,8 @@
 //! [`Stats`]: what an update did, for the diagnostics.
 
-use core::time::Duration;
-use std::time::Instant;
-
 use bevy_ecs::prelude::*;
+use bevy_platform::time::Instant;
+use core::time::Duration;
 
 /// The work of one update; the diagnostics read it and start it over.
 #[derive(Resource, Debug, Default)]
@@ -25,10 +24,8 @@ impl Stats {
 
     /// Notes that a chunk has been meshed.
     pub(crate) fn count_mesh(&mut self, time: Duration) {
-        if !time.is_zero() {
-            self.meshed += 1;
-            self.mesh_time += time;
-        }
+        self.meshed += 1;
+        self.mesh_time += time;
     }
 
     /// Notes that an edit asked for at `since` is visible.

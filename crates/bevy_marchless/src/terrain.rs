@@ -311,6 +311,7 @@ impl Plugin for TerrainPlugin {
             .register_type::<ChunkGeometry>()
             .init_resource::<fill::FillResults>()
             .add_observer(prepare::forget_despawned_chunk)
+            .add_observer(prepare::forget_removed_terrain)
             .add_systems(PostUpdate, prepare_terrains.in_set(MarchlessSystems::Prepare))
             .add_systems(PostUpdate, fill::take_filled_chunks.in_set(MarchlessSystems::Fill));
     }

@@ -86,3 +86,15 @@ fn a_source_that_panics_leaves_air_and_the_app_running() {
     assert!(volume(&app, terrain).grid().get([24, 8, 8]).weight > 0);
     assert!(report(&mut app, terrain).is_closed());
 }
+
+#[test]
+fn without_its_component_a_terrain_is_gone() {
+    let mut app = app();
+    let terrain = settled(&mut app, ball());
+    app.world_mut().entity_mut(terrain).remove::<Terrain>();
+    app.update();
+    assert_eq!(geometry(&mut app, terrain).len(), 0);
+    app.world_mut().entity_mut(terrain).insert(ground());
+    settle(&mut app, terrain);
+    assert_drawn(&mut app, terrain);
+}

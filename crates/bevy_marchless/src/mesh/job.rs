@@ -3,11 +3,11 @@
 use core::cell::RefCell;
 use core::time::Duration;
 use std::sync::Arc;
-use std::time::Instant;
 
 use bevy_asset::RenderAssetUsages;
 use bevy_math::bounding::Aabb3d;
 use bevy_mesh::{Indices, Mesh, PrimitiveTopology};
+use bevy_platform::time::Instant;
 use bevy_tasks::ComputeTaskPool;
 use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, Neighbourhood};
 

@@ -98,6 +98,19 @@ pub(crate) fn forget_despawned_chunk(
     }
 }
 
+/// Without its `Terrain` an entity is no terrain: its chunks and samples go.
+pub(crate) fn forget_removed_terrain(
+    removed: On<Remove, Terrain>,
+    mut volumes: Query<&mut TerrainVolume>,
+    mut commands: Commands,
+) {
+    let Ok(mut volume) = volumes.get_mut(removed.entity) else { return };
+    let former = core::mem::take(&mut *volume);
+    for chunk in former.chunks.into_values().filter_map(|state| state.entity) {
+        commands.entity(chunk).try_despawn();
+    }
+}
+
 /// Whether both are the same before any edit.
 fn same_samples(a: &Terrain, b: &Terrain) -> bool {
     a.source == b.source && a.extent == b.extent && a.chunk_cells == b.chunk_cells && a.voxel_size == b.voxel_size

@@ -65,7 +65,7 @@ pub(crate) struct ChunkState {
     pub(crate) fill: Option<Ticket>,
     /// How many chunks of its 3 × 3 × 3 surroundings, itself included, are not filled.
     pub(crate) missing: u8,
-    /// Whether it has been meshed since the last filling.
+    /// Whether it has ever been meshed; after a new filling its former mesh stays until the next.
     pub(crate) drawn: bool,
     /// Whether nothing is shown of it.
     pub(crate) empty: bool,
