@@ -99,7 +99,21 @@ impl Mesher {
         settings: &MeshSettings,
         out: &mut MeshBuffer,
     ) -> Result<(), MeshError> {
-        out.clear();
+        let meshed = self.mesh_or_refuse(samples, settings, out);
+        if meshed != Ok(true) {
+            out.clear();
+        }
+        meshed.map(|_| ())
+    }
+
+    /// Whether there is a surface; where there is none, `out` is left as it was. What it held is overwritten rather than
+    /// dropped first, so that a warm buffer is not filled with zeros again and again.
+    fn mesh_or_refuse<W: Weight>(
+        &mut self,
+        samples: Samples<'_, W>,
+        settings: &MeshSettings,
+        out: &mut MeshBuffer,
+    ) -> Result<bool, MeshError> {
         if !settings.isovalue.is_finite() {
             return Err(MeshError::Isovalue { found: settings.isovalue });
         }
@@ -107,14 +121,14 @@ impl Mesher {
         classify::classify(&samples, &layout, W::threshold(settings.isovalue), &mut self.signs);
         let vertex_count = crossings::count(&layout, &self.signs, &mut self.rows);
         if vertex_count == 0 {
-            return Ok(());
+            return Ok(false);
         }
         if u32::try_from(vertex_count).is_err() {
             return Err(MeshError::TooManyVertices { found: vertex_count });
         }
         vertices::place(&samples, &layout, settings, &self.signs, &self.rows, vertex_count as usize, out);
         triangles::join(&layout, &self.signs, &self.rows, &mut out.indices);
-        Ok(())
+        Ok(true)
     }
 }
 

@@ -50,7 +50,7 @@ fn join_row(
         // Every cell is given room for the most triangles, and keeps what it needs.
         let room = end + MOST * active.count_ones() as usize;
         if indices.len() < room {
-            indices.resize(room + 2048, 0);
+            indices.resize(room, 0);
         }
         for x in set_bits(active) {
             let case =

@@ -28,12 +28,8 @@ pub(super) fn place<W: Weight>(
     out: &mut MeshBuffer,
 ) {
     out.positions.resize(vertex_count, [0.0; 3]);
-    if settings.normals {
-        out.normals.resize(vertex_count, [0.0; 3]);
-    }
-    if samples.materials().is_some() {
-        out.materials.resize(vertex_count, 0);
-    }
+    out.normals.resize(if settings.normals { vertex_count } else { 0 }, [0.0; 3]);
+    out.materials.resize(if samples.materials().is_some() { vertex_count } else { 0 }, 0);
     let mut pass = Vertices {
         samples,
         layout,
