@@ -6,6 +6,7 @@ use bevy_app::{App, Plugin, PostUpdate};
 use bevy_asset::{Assets, Handle};
 use bevy_ecs::component::ComponentId;
 use bevy_ecs::prelude::*;
+use bevy_ecs::resource::IsResource;
 use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
 
 use crate::chunk::Chunk;
@@ -60,7 +61,8 @@ struct PlainMaterial;
 /// Gives terrains without any material a plain one, which shows the palette's colours, and takes it away when they get
 /// another.
 fn give_default_material(
-    terrains: Query<EntityRef, With<Terrain>>,
+    // Resources are components too; without them, `assets` may be changed meanwhile.
+    terrains: Query<EntityRef, (With<Terrain>, Without<IsResource>)>,
     types: Res<MaterialTypes>,
     assets: Option<ResMut<Assets<StandardMaterial>>>,
     mut plain: Local<Option<Handle<StandardMaterial>>>,
