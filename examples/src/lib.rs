@@ -2,6 +2,7 @@
 //! what to do where there is no screen.
 
 pub mod camera;
+pub mod files;
 pub mod graphics;
 pub mod ground;
 pub mod look;

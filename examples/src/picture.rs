@@ -1,16 +1,20 @@
 //! [`PicturePlugin`]: renders one picture without a window and exits.
 
-use std::path::PathBuf;
+use std::error::Error;
+use std::io::{Cursor, Write as _};
+use std::path::{Path, PathBuf};
 
 use bevy::app::{PluginGroupBuilder, ScheduleRunnerPlugin};
 use bevy::camera::RenderTarget;
-use bevy::image::Image;
+use bevy::image::{Image, ImageFormat};
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::render_resource::TextureFormat;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
+
+use crate::files::write_atomically;
 
 /// `DefaultPlugins` for a window of that title.
 pub fn window_plugins(title: &str) -> PluginGroupBuilder {
@@ -81,9 +85,7 @@ fn take_picture(mut commands: Commands, mut picture: ResMut<Picture>, mut camera
 }
 
 fn save_and_exit(captured: On<ScreenshotCaptured>, picture: Res<Picture>, mut exit: MessageWriter<AppExit>) {
-    let image = captured.image.clone().try_into_dynamic().map_err(|error| error.to_string());
-    let saved = image.and_then(|image| image.to_rgb8().save(&picture.path).map_err(|error| error.to_string()));
-    exit.write(match saved {
+    exit.write(match save(&captured.image, &picture.path) {
         Ok(()) => {
             println!("Wrote {}.", picture.path.display());
             AppExit::Success
@@ -93,4 +95,14 @@ fn save_and_exit(captured: On<ScreenshotCaptured>, picture: Res<Picture>, mut ex
             AppExit::error()
         }
     });
+}
+
+fn save(image: &Image, path: &Path) -> Result<(), Box<dyn Error>> {
+    let format = ImageFormat::Png.as_image_crate_format().ok_or("PNG is not supported")?;
+    // Without the alpha channel, which means nothing here.
+    let image = image.clone().try_into_dynamic()?.to_rgb8();
+    let mut file = Cursor::new(Vec::new());
+    image.write_to(&mut file, format)?;
+    write_atomically(path, |out| out.write_all(file.get_ref()))?;
+    Ok(())
 }
