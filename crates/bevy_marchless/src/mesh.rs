@@ -147,7 +147,7 @@ impl Start<'_, '_, '_> {
     /// Starts the changed chunks that no group is working on.
     fn pending_chunks(&mut self, volume: &mut TerrainVolume) {
         for pending in core::mem::take(&mut volume.pending) {
-            if volume.claims_can_be_freed(&pending.chunks) {
+            if volume.free_for_edit(&pending.chunks) {
                 self.group(volume, pending, Priority::Edit);
             } else {
                 volume.pending.push(pending);

@@ -140,10 +140,16 @@ pub(crate) fn start_work(queue: Res<WorkQueue>, settings: Res<MarchlessSettings>
         }
         (budget, _) => {
             for _ in 0..budget.unwrap_or(8) {
-                let Some(job) = queue.0.take() else { break };
-                run(job);
+                do_next(&queue);
             }
         }
+    }
+}
+
+/// Does the most urgent job here and now.
+pub(crate) fn do_next(queue: &WorkQueue) {
+    if let Some(job) = queue.0.take() {
+        run(job);
     }
 }
 
@@ -211,8 +217,8 @@ mod tests {
     fn the_most_urgent_job_comes_first() {
         use Priority::{Edit, Fill, FirstMesh};
         let (queue, _tickets, results) = queue_of(&[Fill(0), FirstMesh(2), Edit, FirstMesh(1)]);
-        while let Some(job) = queue.0.take() {
-            run(job);
+        for _ in 0..5 {
+            do_next(&queue);
         }
         assert_eq!(results.take(), [Edit, FirstMesh(1), FirstMesh(2), Fill(0)]);
     }
@@ -220,11 +226,11 @@ mod tests {
     #[test]
     fn dropping_a_ticket_withdraws_its_job_unless_it_has_begun() {
         let (queue, mut tickets, results) = queue_of(&[Priority::Fill(0), Priority::Fill(1), Priority::Fill(2)]);
-        run(queue.0.take().unwrap());
+        do_next(&queue);
         assert!(!tickets.remove(0).withdraw(), "it has run");
         drop(tickets.remove(0));
-        run(queue.0.take().unwrap());
-        assert!(queue.0.take().is_none());
+        do_next(&queue);
+        do_next(&queue);
         assert_eq!(results.take(), [Priority::Fill(0), Priority::Fill(2)]);
     }
 
@@ -237,9 +243,8 @@ mod tests {
             let results = results.clone();
             move || results.push(1)
         });
-        while let Some(job) = queue.0.take() {
-            run(job);
-        }
+        do_next(&queue);
+        do_next(&queue);
         assert_eq!(results.take(), [1]);
     }
 }

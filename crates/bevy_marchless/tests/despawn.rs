@@ -2,7 +2,6 @@
 
 mod common;
 
-use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::UVec3;
 use common::*;

@@ -3,7 +3,6 @@
 mod common;
 
 use bevy_app::App;
-use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
 use bevy_math::{Dir3, Quat, Ray3d, Vec3};

@@ -171,12 +171,12 @@ proptest! {
 fn far_regions_are_skipped() {
     let at = |y: i32| SourceRegion { min: [0, y, 0], size: [36; 3], level: 0, spacing: 1.0 };
     let hills = NoiseHeights::default();
-    assert_eq!(hills.bound(&at(96)), Bound::Outside);
+    assert_eq!(hills.bound(&at(113)), Bound::Outside);
     assert_eq!(hills.bound(&at(60)), Bound::Mixed);
     assert_eq!(hills.bound(&at(-40)), Bound::Inside { material: 2 });
     let ground = Some(NoiseHeightsSettings::default());
     let caves = NoiseDensity::new(NoiseDensitySettings { ground, ..Default::default() }).expect("in range");
-    assert_eq!(caves.bound(&at(96)), Bound::Outside);
+    assert_eq!(caves.bound(&at(113)), Bound::Outside);
     assert_eq!(caves.bound(&at(0)), Bound::Mixed);
     let settings = HeightMapSettings { floor: Some(60.0), ..Default::default() };
     let map = HeightMap::from_samples([64, 64], (0..4096u16).map(|v| v % 20).collect(), settings).expect("in range");

@@ -3,7 +3,6 @@
 mod common;
 
 use bevy_camera::primitives::Aabb;
-use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_mesh::Mesh3d;

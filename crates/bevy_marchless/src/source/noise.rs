@@ -18,9 +18,9 @@ pub struct Fractal {
     pub seed: u32,
     /// How many octaves are added up. [Limit: 1..=16] [Default: 5]
     pub octaves: u32,
-    /// The size of the largest features. [Units: world] [Limit: > 0] [Default: 100]
+    /// The size of the largest features. [Units: world] [Limit: > 0] [Default: 120]
     pub zoom: f64,
-    /// How strong each octave is, as a share of the one before. [Limit: > 0, <= 1] [Default: 0.5]
+    /// How strong each octave is, as a share of the one before. [Limit: > 0, <= 1] [Default: 0.45]
     pub persistence: f64,
     /// How many times finer each octave is than the one before. [Limit: 1..=8] [Default: 2]
     pub lacunarity: f64,
@@ -30,7 +30,7 @@ pub struct Fractal {
 
 impl Default for Fractal {
     fn default() -> Self {
-        Self { seed: 0, octaves: 5, zoom: 100.0, persistence: 0.5, lacunarity: 2.0, ridged: false }
+        Self { seed: 0, octaves: 5, zoom: 120.0, persistence: 0.45, lacunarity: 2.0, ridged: false }
     }
 }
 
@@ -111,9 +111,9 @@ pub struct NoiseHeightsSettings {
     /// The noise; its `zoom` is about the distance between hills.
     pub noise: Fractal,
     /// The height in the middle between the highest and the lowest possible. [Units: world, from the terrain's lowest
-    /// corner] [Default: 48]
+    /// corner] [Default: 56]
     pub base: f64,
-    /// How far heights reach above and below the base at most. [Units: world] [Limit: >= 0] [Default: 40]
+    /// How far heights reach above and below the base at most. [Units: world] [Limit: >= 0] [Default: 52]
     pub amplitude: f64,
     /// The ground's materials. [Default: material 2 from 5 units of depth and where it is steeper than 1, material 1
     /// from 1.5 units of depth, and 0 on top]
@@ -122,7 +122,7 @@ pub struct NoiseHeightsSettings {
 
 impl Default for NoiseHeightsSettings {
     fn default() -> Self {
-        Self { noise: Fractal::default(), base: 48.0, amplitude: 40.0, strata: default_strata() }
+        Self { noise: Fractal::default(), base: 56.0, amplitude: 52.0, strata: default_strata() }
     }
 }
 

@@ -191,8 +191,8 @@ impl TerrainVolume {
         }
     }
 
-    /// Whether no group works on `chunks`. Groups that may give way to an edit, and have not begun, do so.
-    pub(crate) fn claims_can_be_freed(&mut self, chunks: &BTreeSet<[i32; 3]>) -> bool {
+    /// Whether no group works on `chunks`. Groups that may give way to an edit do so where none of their jobs has begun.
+    pub(crate) fn free_for_edit(&mut self, chunks: &BTreeSet<[i32; 3]>) -> bool {
         let claimed: BTreeSet<u64> = chunks.iter().filter_map(|position| self.claims.get(position)).copied().collect();
         let mut free = true;
         for id in claimed {
@@ -247,4 +247,62 @@ impl ChunkState {
 /// The 3 × 3 × 3 chunks around `position`, itself included.
 pub(crate) fn around(position: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
     Region::new(position.map(|v| v - 1), position.map(|v| v + 2)).points()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::work::{Priority, WorkQueue, do_next};
+
+    /// A volume with one group of one job for the first chunk.
+    fn volume_with_group(withdrawable: bool, queue: &WorkQueue) -> TerrainVolume {
+        let mut volume = TerrainVolume::default();
+        let chunks = BTreeSet::from([[0, 0, 0]]);
+        let id = volume.claim(&chunks);
+        let group = Group {
+            chunks,
+            snapshot: BTreeMap::new(),
+            isovalue: 0.0,
+            since: None,
+            withdrawable,
+            tickets: vec![queue.push(Priority::FirstMesh(0), || ())],
+            members: 1,
+            meshed: Vec::new(),
+        };
+        volume.groups.insert(id, group);
+        volume
+    }
+
+    #[test]
+    fn an_edit_waits_for_groups_unless_they_can_give_way() {
+        let edited = BTreeSet::from([[0, 0, 0], [1, 0, 0]]);
+        let elsewhere = BTreeSet::from([[1, 0, 0]]);
+        let queue = WorkQueue::default();
+        let mut volume = volume_with_group(false, &queue);
+        assert!(volume.free_for_edit(&elsewhere));
+        assert!(!volume.free_for_edit(&edited), "an edit's group shows first");
+        let mut volume = volume_with_group(true, &queue);
+        assert!(volume.free_for_edit(&edited), "nobody works on it yet");
+        assert!(volume.groups.is_empty() && volume.claims.is_empty());
+        let queue = WorkQueue::default();
+        let mut volume = volume_with_group(true, &queue);
+        do_next(&queue);
+        assert!(!volume.free_for_edit(&edited), "it has begun");
+        assert!(volume.take_group(1).is_some());
+        assert!(volume.free_for_edit(&edited));
+    }
+
+    #[test]
+    fn sets_that_overlap_become_one() {
+        let mut volume = TerrainVolume::default();
+        let set = |xs: &[i32]| xs.iter().map(|&x| [x, 0, 0]).collect::<BTreeSet<_>>();
+        volume.add_pending(set(&[0, 1]), None);
+        volume.add_pending(set(&[4, 5]), None);
+        assert_eq!(volume.pending.len(), 2);
+        volume.add_pending(set(&[1, 2, 4]), None);
+        let [only] = &volume.pending[..] else { panic!("one set: {:?}", volume.pending) };
+        assert_eq!(only.chunks, set(&[0, 1, 2, 4, 5]));
+        volume.add_pending(set(&[]), None);
+        assert_eq!(volume.pending.len(), 1);
+    }
 }
