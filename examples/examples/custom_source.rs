@@ -7,6 +7,7 @@
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::fly_camera;
+use marchless_examples::small::sun;
 
 /// Ground that rises in terraces from a shaft in the middle.
 struct Terraces {
@@ -60,9 +61,5 @@ fn main() -> AppExit {
 fn setup(mut commands: Commands) {
     commands.spawn(Terrain::new(Terraces { middle: [128.0; 2], step: 9.0 }));
     commands.spawn(fly_camera(Vec3::new(128.0, 190.0, 290.0), Vec3::new(128.0, 30.0, 120.0)));
-    commands.spawn((
-        DirectionalLight { shadow_maps_enabled: true, ..default() },
-        Transform::default().looking_to(Vec3::new(-0.7, -0.6, -0.3), Vec3::Y),
-    ));
-    commands.insert_resource(ClearColor(Color::srgb(0.85, 0.75, 0.65)));
+    commands.spawn(sun(Vec3::new(-0.5, -0.8, -0.3)));
 }

@@ -7,6 +7,7 @@ use bevy::input::common_conditions::input_pressed;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::{fly_camera, mouse_is_grabbed};
+use marchless_examples::small::sun;
 
 /// Turns by so many radians per second around each axis.
 #[derive(Component)]
@@ -28,10 +29,10 @@ fn asteroid(number: u32) -> Sdf {
     };
     let middle = Vec3::splat(32.0);
     let core = Sdf::sphere(middle, 18.0).with_material(2);
-    let bump = |index| Sdf::sphere(middle + toward(index) * 14.0, 6.0 + f64::from(index % 3)).with_material(6);
-    let crater = |index| Sdf::sphere(middle + toward(index) * 24.0, 6.0 + f64::from(index % 4));
-    let bumpy = (0..6).map(bump).fold(core, |all, bump| all.smooth_union(bump, 6.0));
-    (6..11).map(crater).fold(bumpy, Sdf::subtraction)
+    let bump = |index| Sdf::sphere(middle + toward(index) * 14.0, 5.0 + f64::from(index % 4)).with_material(6);
+    let crater = |index| Sdf::sphere(middle + toward(index) * 22.0, 4.0 + f64::from(index % 5));
+    let bumpy = (0..8).map(bump).fold(core, |all, bump| all.smooth_union(bump, 3.0));
+    (8..20).map(crater).fold(bumpy, Sdf::subtraction)
 }
 
 fn setup(mut commands: Commands) {
@@ -49,9 +50,9 @@ fn setup(mut commands: Commands) {
             ));
     }
     commands.spawn(fly_camera(Vec3::new(0.0, 20.0, 190.0), Vec3::ZERO));
-    commands
-        .spawn((DirectionalLight::default(), Transform::default().looking_to(Vec3::new(-1.0, -0.5, -0.6), Vec3::Y)));
+    commands.spawn(sun(Vec3::new(-1.0, -0.5, -0.6)));
     commands.insert_resource(ClearColor(Color::BLACK));
+    commands.insert_resource(GlobalAmbientLight { brightness: 100.0, ..default() });
 }
 
 fn turn(time: Res<Time>, mut asteroids: Query<(&mut Transform, &Turning)>) {

@@ -7,6 +7,7 @@ use bevy::input::common_conditions::input_just_pressed;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::{fly_camera, mouse_is_grabbed};
+use marchless_examples::small::sun;
 
 fn main() -> AppExit {
     // In a game: App::new().add_plugins(DefaultPlugins)
@@ -20,12 +21,8 @@ fn main() -> AppExit {
 fn setup(mut commands: Commands) {
     commands.spawn(Terrain::new(NoiseHeights::from_seed(7)));
 
-    commands.spawn(fly_camera(Vec3::new(128.0, 130.0, 320.0), Vec3::new(128.0, 40.0, 128.0)));
-    commands.spawn((
-        DirectionalLight { shadow_maps_enabled: true, ..default() },
-        Transform::default().looking_to(Vec3::new(-0.6, -0.6, -0.4), Vec3::Y),
-    ));
-    commands.insert_resource(ClearColor(Color::srgb(0.55, 0.7, 0.85)));
+    commands.spawn(fly_camera(Vec3::new(128.0, 150.0, 330.0), Vec3::new(128.0, 40.0, 128.0)));
+    commands.spawn(sun(Vec3::new(-0.6, -0.6, -0.4)));
 }
 
 fn dig(camera: Single<&Transform, With<Camera3d>>, terrains: TerrainQuery, mut stamps: MessageWriter<Stamp>) {

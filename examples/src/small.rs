@@ -1,7 +1,8 @@
-//! [`app`]: what the small examples stand on, in a window or as a picture.
+//! [`app`] and [`sun`]: what the small examples stand on, in a window or as a picture.
 
 use std::path::PathBuf;
 
+use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
 use bevy_marchless::prelude::TerrainVolume;
 use clap::Parser;
@@ -18,7 +19,8 @@ struct Arguments {
     screenshot: Option<PathBuf>,
 }
 
-/// An app with Bevy's default plugins and a camera to fly with, in a window of that title.
+/// An app with Bevy's default plugins, the plugin of [`fly_camera`](crate::camera::fly_camera), a blue sky and the light that
+/// comes from it, in a window of that title.
 ///
 /// With `--screenshot FILE.png` it has no window, renders one picture as soon as all terrains are drawn, and exits. Where there
 /// is no screen or no graphics adapter it says so and exits with code 1.
@@ -33,10 +35,22 @@ pub fn app(title: &str) -> App {
                 .add_systems(PreUpdate, wait_for_terrains);
         }
     });
-    built.unwrap_or_else(|missing| {
+    let mut app = built.unwrap_or_else(|missing| {
         eprintln!("This example needs a screen, but {missing}.");
         std::process::exit(1)
-    })
+    });
+    app.insert_resource(ClearColor(Color::srgb(0.55, 0.7, 0.85)))
+        .insert_resource(GlobalAmbientLight { brightness: 500.0, ..default() });
+    app
+}
+
+/// A sun that shines in that direction, with shadows as far as a small terrain reaches.
+pub fn sun(direction: Vec3) -> impl Bundle {
+    (
+        DirectionalLight { shadow_maps_enabled: true, ..default() },
+        CascadeShadowConfigBuilder { maximum_distance: 600.0, first_cascade_far_bound: 150.0, ..default() }.build(),
+        Transform::default().looking_to(direction, Vec3::Y),
+    )
 }
 
 fn wait_for_terrains(terrains: Query<&TerrainVolume>, mut ready: ResMut<PictureReady>) {
