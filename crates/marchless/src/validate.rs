@@ -1,7 +1,7 @@
 //! [`MeshReport`]: what is sound and what is not in an indexed triangle mesh, whoever made it.
 //!
-//! Two corners of triangles belong to the same fan where their triangles share an edge at their vertex. Edges are
-//! sorted and fans joined by union–find, so that a mesh of millions of triangles takes a second rather than a day.
+//! Edges are found by sorting; the fans of triangles around each vertex, and the pieces of the whole, by union–find.
+//! That takes about a microsecond a triangle.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -29,7 +29,7 @@ pub struct MeshReport {
     pub vertices: usize,
     /// All whole triples of indices.
     pub triangles: usize,
-    /// Edges of one triangle: the rim of an open surface.
+    /// Edges of one triangle only: the rim of an open surface.
     pub boundary_edges: usize,
     /// Edges of three or more triangles.
     pub non_manifold_edges: usize,
