@@ -9,7 +9,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{AsBindGroup, ShaderType};
 use bevy::shader::{Shader, ShaderRef};
 
-use crate::look::{LOOKS, Look, linear};
+use crate::look::{LOOKS, Look, air, linear};
 
 /// Bevy's standard material with [`GroundExtension`].
 pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
@@ -41,7 +41,7 @@ impl GroundExtension {
     pub fn new(look: &Look, relief: [f32; 2]) -> Self {
         let color = |color: [f32; 3]| linear(color).to_vec4();
         let line = |share: f32| relief[0] + share * (relief[1] - relief[0]);
-        let sky = linear(look.zenith).mix(&linear(look.horizon), 0.55);
+        let sky = air(look.zenith).mix(&air(look.horizon), 0.55);
         Self {
             ground: GroundUniform {
                 grass: color(look.grass[0]),
@@ -51,7 +51,7 @@ impl GroundExtension {
                 sand: color(look.sand),
                 snow: color(look.snow),
                 sky: sky.to_vec4().with_w(look.skylight),
-                mist: color(look.horizon),
+                mist: air(look.horizon).to_vec4(),
                 heights: Vec4::new(relief[0], relief[1], line(look.lines[0]), line(look.lines[1])),
             },
         }

@@ -31,6 +31,11 @@ fn layers(p: vec3<f32>, large: f32, middle: f32) -> f32 {
     return smoothstep(0.25, 0.75, 0.65 * thick + 0.35 * thin);
 }
 
+// 0 at the end of the sand, 1 where the snow begins.
+fn height_share(height: f32) -> f32 {
+    return (height - ground.heights.z) / max(ground.heights.w - ground.heights.z, 1.0);
+}
+
 @fragment
 fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> FragmentOutput {
     var pbr = pbr_input_from_standard_material(in, is_front);
@@ -48,14 +53,16 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
     let stone = mix(ground.dark_rock.rgb, ground.rock.rgb, layers(p, large, middle)) * (0.75 + 0.5 * middle);
     let own = in.color.rgb * mix(0.82, 1.12, layers(p, large, middle)) * (0.8 + 0.4 * middle);
 
-    // Natural ground: meadow, sand below, snow above, rock where it is steep.
+    // Natural ground: meadow with woods, sand below, snow above, rock where it is steep.
     let step = 0.03 * (ground.heights.y - ground.heights.x);
-    var natural = mix(ground.grass.rgb, ground.dry_grass.rgb, smoothstep(0.35, 0.68, 0.6 * large + 0.4 * middle));
-    natural *= 0.72 + 0.56 * middle;
+    let rough = 0.10 * (middle - 0.5) + 0.10 * (fine - 0.5);
+    var natural = mix(ground.grass.rgb, ground.dry_grass.rgb, smoothstep(0.34, 0.66, 0.75 * large + 0.25 * middle));
+    let woods = smoothstep(0.50, 0.60, fractal(p * 0.045 + 31.0, 4)) * smoothstep(0.46, 0.40, height_share(height));
+    natural = mix(natural, ground.grass.rgb * (0.30 + 0.35 * fine), 0.85 * woods);
+    natural *= 0.86 + 0.28 * middle;
     natural = mix(ground.sand.rgb * (0.9 + 0.2 * fine), natural, smoothstep(-step, step, height - ground.heights.z));
-    let bare = smoothstep(0.17, 0.36, steep + (middle - 0.5) * 0.28);
-    natural = mix(natural, stone, bare);
-    let lies = smoothstep(0.50, 0.30, steep + (middle - 0.5) * 0.3);
+    natural = mix(natural, stone, smoothstep(0.19, 0.32, steep + rough));
+    let lies = smoothstep(0.42, 0.30, steep + rough);
     let snow = smoothstep(-step, step, height + (middle - 0.5) * 8.0 - ground.heights.w) * lies;
     natural = mix(natural, ground.snow.rgb, snow);
 
@@ -71,7 +78,7 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
             fractal((p + vec3(0.0, e, 0.0)) * 0.9, 2) - fine,
             fractal((p + vec3(0.0, 0.0, e)) * 0.9, 2) - fine,
         ) / e;
-        pbr.N = normalize(pbr.N - close * (1.0 - 0.7 * snow) * 0.55 * (bumps - dot(bumps, pbr.N) * pbr.N));
+        pbr.N = normalize(pbr.N - close * (1.0 - 0.7 * snow) * 0.38 * (bumps - dot(bumps, pbr.N) * pbr.N));
     }
 
     pbr.material.base_color = vec4(color, 1.0);

@@ -1,5 +1,6 @@
 //! [`Look`]: the colours, light and air of a scene, and [`LookPlugin`], which puts one on.
 
+use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::pbr::{DistanceFog, ExtendedMaterial, FogFalloff};
 use bevy::prelude::*;
@@ -49,10 +50,10 @@ pub const LOOKS: [Look; 6] = [
         horizon: [0.70, 0.80, 0.90],
         sun: [1.0, 0.93, 0.82],
         sun_angles: [34.0, 62.0],
-        illuminance: 11_000.0,
-        skylight: 0.34,
+        illuminance: 17_000.0,
+        skylight: 0.51,
         clouds: 0.45,
-        visibility: 1_500.0,
+        visibility: 1_000.0,
         grass: [[0.29, 0.42, 0.16], [0.48, 0.47, 0.24]],
         rock: [[0.55, 0.53, 0.50], [0.38, 0.37, 0.37]],
         sand: [0.66, 0.60, 0.46],
@@ -65,10 +66,10 @@ pub const LOOKS: [Look; 6] = [
         horizon: [0.96, 0.72, 0.50],
         sun: [1.0, 0.72, 0.42],
         sun_angles: [17.0, 74.0],
-        illuminance: 10_000.0,
-        skylight: 0.27,
+        illuminance: 17_000.0,
+        skylight: 0.41,
         clouds: 0.55,
-        visibility: 1_100.0,
+        visibility: 900.0,
         grass: [[0.42, 0.43, 0.17], [0.62, 0.50, 0.24]],
         rock: [[0.60, 0.50, 0.42], [0.42, 0.34, 0.30]],
         sand: [0.72, 0.58, 0.40],
@@ -81,10 +82,10 @@ pub const LOOKS: [Look; 6] = [
         horizon: [0.88, 0.80, 0.68],
         sun: [1.0, 0.90, 0.74],
         sun_angles: [30.0, 50.0],
-        illuminance: 12_000.0,
-        skylight: 0.30,
+        illuminance: 18_000.0,
+        skylight: 0.45,
         clouds: 0.15,
-        visibility: 1_400.0,
+        visibility: 700.0,
         grass: [[0.74, 0.48, 0.28], [0.80, 0.56, 0.34]],
         rock: [[0.72, 0.38, 0.22], [0.50, 0.24, 0.16]],
         sand: [0.86, 0.68, 0.44],
@@ -97,10 +98,10 @@ pub const LOOKS: [Look; 6] = [
         horizon: [0.88, 0.70, 0.74],
         sun: [1.0, 0.76, 0.62],
         sun_angles: [15.0, 68.0],
-        illuminance: 9_000.0,
-        skylight: 0.34,
+        illuminance: 15_000.0,
+        skylight: 0.51,
         clouds: 0.6,
-        visibility: 1_000.0,
+        visibility: 600.0,
         grass: [[0.24, 0.31, 0.20], [0.42, 0.38, 0.28]],
         rock: [[0.44, 0.45, 0.50], [0.29, 0.30, 0.35]],
         sand: [0.46, 0.44, 0.42],
@@ -113,10 +114,10 @@ pub const LOOKS: [Look; 6] = [
         horizon: [0.86, 0.68, 0.50],
         sun: [1.0, 0.90, 0.80],
         sun_angles: [28.0, 60.0],
-        illuminance: 9_000.0,
-        skylight: 0.25,
+        illuminance: 15_000.0,
+        skylight: 0.38,
         clouds: 0.0,
-        visibility: 900.0,
+        visibility: 700.0,
         grass: [[0.60, 0.33, 0.20], [0.67, 0.41, 0.26]],
         rock: [[0.48, 0.29, 0.21], [0.33, 0.20, 0.16]],
         sand: [0.74, 0.47, 0.30],
@@ -129,10 +130,10 @@ pub const LOOKS: [Look; 6] = [
         horizon: [0.78, 0.84, 0.88],
         sun: [1.0, 0.95, 0.86],
         sun_angles: [42.0, 48.0],
-        illuminance: 10_500.0,
-        skylight: 0.36,
+        illuminance: 16_000.0,
+        skylight: 0.54,
         clouds: 0.7,
-        visibility: 1_200.0,
+        visibility: 750.0,
         grass: [[0.23, 0.38, 0.14], [0.46, 0.36, 0.30]],
         rock: [[0.50, 0.49, 0.47], [0.33, 0.33, 0.34]],
         sand: [0.52, 0.50, 0.36],
@@ -229,7 +230,7 @@ fn wear_look(
     cameras: Query<Entity, With<Camera3d>>,
 ) {
     let look = scene.look();
-    let horizon = linear(look.horizon);
+    let horizon = air(look.horizon);
 
     if let Some(mut material) = grounds.get_mut(&ground.0) {
         material.extension = GroundExtension::new(look, scene.relief);
@@ -251,13 +252,19 @@ fn wear_look(
 
     let far = scene.size / 256.0;
     for camera in &cameras {
-        commands.entity(camera).insert(DistanceFog {
+        let fog = DistanceFog {
             color: horizon.into(),
             directional_light_color: Color::from(linear(look.sun)).with_alpha(0.06),
             directional_light_exponent: 12.0,
             falloff: FogFalloff::from_visibility_squared(look.visibility * far),
-        });
+        };
+        commands.entity(camera).insert((fog, Tonemapping::AcesFitted));
     }
+}
+
+/// A colour of the sky, as bright as the tone mapping wants it.
+pub(crate) fn air(color: [f32; 3]) -> LinearRgba {
+    linear(color) * 1.5
 }
 
 /// A colour given in sRGB.

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{AsBindGroup, ShaderType};
 use bevy::shader::{Shader, ShaderRef};
 
-use crate::look::{LOOKS, Look, linear};
+use crate::look::{LOOKS, Look, air, linear};
 
 /// The dome; it follows the camera.
 #[derive(Component)]
@@ -35,8 +35,8 @@ impl SkyMaterial {
     pub fn new(look: &Look) -> Self {
         Self {
             sky: SkyUniform {
-                zenith: linear(look.zenith).to_vec4(),
-                horizon: linear(look.horizon).to_vec4(),
+                zenith: air(look.zenith).to_vec4(),
+                horizon: air(look.horizon).to_vec4(),
                 sun: linear(look.sun).to_vec4().with_w(look.clouds),
                 to_sun: look.to_sun().extend(0.0),
             },

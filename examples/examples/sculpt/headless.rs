@@ -45,10 +45,8 @@ fn try_run(world: &World, out: &Path) -> Result<(), Box<dyn core::error::Error>>
 
     let start = Instant::now();
     app.world_mut().write_message(tunnel(entity, world, size.as_vec3()));
-    settle(&mut app, entity)?;
+    let removed = settle(&mut app, entity)?;
     let time = start.elapsed();
-    let mut edits = app.world_mut().resource_mut::<Messages<TerrainEdited>>();
-    let removed: u64 = edits.drain().flat_map(|edit| edit.removed.into_values()).sum();
     println!("Dug a tunnel of {removed} cubic voxels in {}.", milliseconds(time));
     let mesh = collect(&mut app, &terrain);
     let report = report(&mesh);
@@ -69,19 +67,22 @@ fn tunnel(terrain: Entity, world: &World, size: Vec3) -> Stamp {
     Stamp::dig(terrain, BrushShape::capsule(end(-8.0, 0.35), end(size.x + 8.0, 0.15), 7.0))
 }
 
-/// Updates until all is as it is drawn.
-fn settle(app: &mut App, terrain: Entity) -> Result<(), &'static str> {
+/// Updates until all is as it is drawn; returns how many cubic voxels were removed meanwhile.
+fn settle(app: &mut App, terrain: Entity) -> Result<u64, &'static str> {
     let start = Instant::now();
-    // The first update reads what was written before it.
-    app.update();
-    while !app.world().get::<TerrainVolume>(terrain).is_some_and(TerrainVolume::is_settled) {
+    let mut removed = 0;
+    loop {
+        app.update();
+        let edits = app.world_mut().resource_mut::<Messages<TerrainEdited>>().drain().collect::<Vec<_>>();
+        removed += edits.iter().flat_map(|edit| edit.removed.values()).sum::<u64>();
+        if app.world().get::<TerrainVolume>(terrain).is_some_and(TerrainVolume::is_settled) {
+            return Ok(removed);
+        }
         if start.elapsed() > PATIENCE {
             return Err("the world is not ready after half an hour");
         }
         std::thread::sleep(Duration::from_millis(1));
-        app.update();
     }
-    Ok(())
 }
 
 /// The meshes of all chunks as one, in metres; vertices on shared borders are equal bit for bit and become one.

@@ -113,11 +113,6 @@ impl World {
         Ok(terrain.with_isovalue(self.isovalue).with_palette(LOOKS[self.look].palette()))
     }
 
-    /// How large a voxel of its terrain is. [Units: metres]
-    pub(crate) fn voxel_size(&self) -> f32 {
-        self.map.as_ref().filter(|_| self.kind == Kind::HeightMap).map_or(1.0, |map| map.voxel_size)
-    }
-
     /// The heights between which its ground lies. [Units: voxels]
     pub(crate) fn relief(&self) -> [f32; 2] {
         match (self.kind, &self.map) {
@@ -214,9 +209,9 @@ fn spawn_world(world: Res<World>, ground: Res<Ground>, mut commands: Commands) {
     let Ok(terrain) = world.terrain() else { return };
     let size = terrain.size_in_voxels().as_vec3();
     let [low, high] = world.relief();
-    let middle = Vec3::new(0.5 * size.x, low + 0.38 * (high - low), 0.5 * size.z);
+    let middle = Vec3::new(0.5 * size.x, low + 0.5 * (high - low), 0.5 * size.z);
     let reach = size.x.max(size.z);
-    let eye = middle + reach * Vec3::new(-0.36, 0.0, 0.60) + Vec3::Y * (0.75 * (high - low) + 0.16 * reach);
+    let eye = middle + reach * Vec3::new(-0.46, 0.185, 0.64);
     commands.spawn(fly_camera(eye, middle));
     commands.spawn((terrain, MeshMaterial3d(ground.0.clone())));
 }

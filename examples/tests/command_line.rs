@@ -1,0 +1,123 @@
+//! What sculpt says and returns: bad input gets one clear sentence and code 2, the headless run a mesh without defects.
+
+mod common;
+
+use std::fs;
+use std::process::Output;
+
+use bevy_marchless::marchless::MeshReport;
+use common::{example, folder_of_tests};
+
+fn sculpt(args: &[&str]) -> Output {
+    example("sculpt")
+        .args(args)
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .expect("sculpt can be run")
+}
+
+#[track_caller]
+fn assert_refused(args: &[&str], because: &str) {
+    let output = sculpt(args);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{args:?} ended with {}:\n{errors}", output.status);
+    assert!(errors.contains(because), "{args:?} said:\n{errors}");
+    assert!(!errors.contains("panicked"), "{args:?} said:\n{errors}");
+}
+
+#[test]
+fn bad_numbers_are_refused() {
+    let map = ["--heightmap", "map.png", "--metres-per-pixel"];
+    for pair in ["0,1", "1", "1,-2", "NaN,1", "1,inf", "a,b", ""] {
+        assert_refused(&[&map[..], &[pair, "--metres-per-unit", "1"]].concat(), "two numbers above 0");
+    }
+    for number in ["0", "NaN", "-1", "inf", "one"] {
+        for flag in ["--metres-per-unit", "--voxel-size", "--exaggerate"] {
+            assert_refused(&[&map[..], &["1,1", &format!("{flag}={number}")]].concat(), "a number above 0");
+        }
+    }
+    for size in ["0,100", "100", "9000,100", "1e2,1e2"] {
+        assert_refused(&["--size", size], "whole numbers from 16 to 8192");
+    }
+    for place in ["0.5", "2,0", "0.5,0.5,NaN", "0.5,0.5,1000", "0.5,NaN"] {
+        assert_refused(&["--screenshot", "a.png", "--dig", place], "two numbers from 0 to 1");
+    }
+    assert_refused(&["--heightmap", "map.png"], "--metres-per-pixel");
+}
+
+#[test]
+fn bad_height_maps_are_refused() {
+    let folder = folder_of_tests();
+    let write = |name: &str, bytes: &[u8]| {
+        fs::write(folder.join(name), bytes).expect("the folder of tests can be written");
+    };
+    let picture = |color: png::ColorType, depth: png::BitDepth, bytes: usize| {
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::new(&mut file, 64, 64);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        let mut writer = encoder.write_header().expect("a header");
+        // Noise, so that it does not shrink to nothing.
+        let noise = (0..bytes as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect::<Vec<_>>();
+        writer.write_image_data(&noise).expect("as many samples as the header says");
+        drop(writer);
+        file
+    };
+    write("grey8.png", &picture(png::ColorType::Grayscale, png::BitDepth::Eight, 64 * 64));
+    write("color.png", &picture(png::ColorType::Rgb, png::BitDepth::Sixteen, 64 * 64 * 6));
+    let whole = picture(png::ColorType::Grayscale, png::BitDepth::Sixteen, 64 * 64 * 2);
+    write("cut.png", &whole[..whole.len() / 2]);
+    write("whole.png", &whole);
+    write("text.png", b"elevation");
+    write("empty.png", b"");
+
+    let scale = ["--metres-per-pixel", "1,1", "--metres-per-unit", "1"];
+    for (file, because) in [
+        ("grey8.png", "16-bit grey"),
+        ("color.png", "16-bit grey"),
+        ("cut.png", "cut short"),
+        ("text.png", "PNG"),
+        ("empty.png", ""),
+        ("missing.png", "missing.png"),
+    ] {
+        assert_refused(&[&["--headless", "--heightmap", file], &scale[..]].concat(), because);
+    }
+    let tiny = [&["--headless", "--heightmap", "whole.png", "--voxel-size", "1e-6"], &scale[..]].concat();
+    assert_refused(&tiny, "extent");
+}
+
+#[test]
+fn files_that_cannot_be_written_are_refused() {
+    let missing = "missing_folder/a";
+    assert_refused(&["--headless", "--out", &format!("{missing}.glb")], "no folder missing_folder");
+    assert_refused(&["--screenshot", &format!("{missing}.png")], "no folder missing_folder");
+    assert_refused(&["--headless", "--out", "."], "folder");
+    assert_refused(&["--screenshot", "a.jpg"], ".png");
+}
+
+#[test]
+fn without_a_display_it_runs_headless_and_writes_a_closed_mesh() {
+    let path = folder_of_tests().join("tunnel.glb");
+    let _ = fs::remove_file(&path);
+    let output = sculpt(&["--out", "tunnel.glb"]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}:\n{said}{errors}", output.status);
+    assert!(said.contains("this is the headless run"), "{said}");
+
+    let file =
+        gltf::Glb::from_slice(&fs::read(&path).expect("the mesh was written")).expect("it is binary glTF").into_owned();
+    let bytes = file.bin.expect("it holds the mesh");
+    let gltf = gltf::Gltf::from_slice(&fs::read(&path).expect("it was written")).expect("it is valid glTF");
+    let primitive = gltf.meshes().next().and_then(|mesh| mesh.primitives().next()).expect("there is a mesh");
+    let reader = primitive.reader(|_| Some(&bytes));
+    let positions: Vec<[f32; 3]> = reader.read_positions().expect("positions").collect();
+    let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
+    let normals = reader.read_normals().expect("normals").count();
+    let report = MeshReport::new(&positions, &indices);
+    assert!(report.triangles > 10_000 && report.is_closed() && report.is_clean(), "{report}");
+    assert_eq!(normals, positions.len());
+    // The tunnel goes through: the surface has a hole.
+    assert!(report.euler <= 2 * report.components as i64 - 2, "{report}");
+}

@@ -1,0 +1,234 @@
+//! Pictures of the examples, rendered for real: coarse features are compared, not exact pixels.
+//!
+//! Without a graphics adapter the tests skip with a printed line; with `MARCHLESS_REQUIRE_PICTURES=1` they fail instead.
+//! Pictures are kept in `MARCHLESS_PICTURES`, by default in the folder of tests in `target`. The height map is that of
+//! `MARCHLESS_TEST_DATA`, or a generated one.
+
+mod common;
+
+use std::collections::HashSet;
+use std::fs::{self, File};
+use std::io::{BufReader, BufWriter};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{example, folder_of_tests};
+
+/// Rows of red, green and blue.
+struct Picture {
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+/// A ball that was dug, as the picture shows it. [Units: pixels]
+struct Disc {
+    x: f32,
+    y: f32,
+    radius: f32,
+}
+
+const SIZE: &str = "320,180";
+
+#[test]
+fn a_dig_shows_where_it_was_dug_and_nowhere_else() {
+    let Some((before, _)) = sculpt("hills", &[]) else { return };
+    let Some((after, discs)) = sculpt("hills_dug", &["--dig", "0.45,0.62,16"]) else { return };
+    before.assert_is_a_landscape();
+    after.assert_is_a_landscape();
+    assert_only_disc_changed(&before, &after, &discs);
+}
+
+#[test]
+fn a_height_map_can_be_dug() {
+    let map = height_map();
+    let map = map.to_str().expect("the folder of tests has a plain name");
+    let flags = ["--heightmap", map, "--metres-per-pixel", "74,93", "--metres-per-unit", "1", "--exaggerate", "3"];
+    // Fewer voxels than by default: this is about the picture.
+    let flags = [flags.as_slice(), &["--voxel-size", "120"]].concat();
+    let Some((before, _)) = sculpt("height_map", &flags) else { return };
+    let Some((after, discs)) = sculpt("height_map_dug", &[&flags[..], &["--dig", "0.5,0.6,12"]].concat()) else {
+        return;
+    };
+    before.assert_is_a_landscape();
+    assert_only_disc_changed(&before, &after, &discs);
+}
+
+#[test]
+fn quickstart_shows_hills() {
+    let path = picture_path("quickstart");
+    let Some(_) = render(example("quickstart").arg("--screenshot").arg(&path)) else { return };
+    Picture::read(&path).assert_is_a_landscape();
+}
+
+#[test]
+fn a_window_opens_and_shows_something() {
+    let folder = folder_of_tests().join(format!("screen_{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("the folder of tests can be written");
+    let mut screen = Command::new("Xvfb");
+    // The server chooses a free display and writes its number to standard output.
+    screen.args(["-displayfd", "1", "-screen", "0", "640x360x24", "-nolisten", "tcp", "-fbdir"]).arg(&folder);
+    let Ok(screen) = screen.stdout(Stdio::piped()).stderr(Stdio::null()).spawn() else {
+        return skip("there is no Xvfb");
+    };
+    let mut screen = Running(screen);
+    let mut display = String::new();
+    let stdout = screen.0.stdout.take().expect("it is piped");
+    std::io::BufRead::read_line(&mut BufReader::new(stdout), &mut display).expect("Xvfb names its display");
+
+    let log = File::create(folder.join("log.txt")).expect("the folder of tests can be written");
+    let mut sculpt = example("sculpt");
+    sculpt.env("DISPLAY", format!(":{}", display.trim())).env_remove("WAYLAND_DISPLAY");
+    sculpt.args(["--out", "window.glb"]).stdout(log.try_clone().expect("a log")).stderr(log);
+    let mut sculpt = Running(sculpt.spawn().expect("sculpt can be run"));
+
+    let start = Instant::now();
+    loop {
+        std::thread::sleep(Duration::from_millis(500));
+        let said = || fs::read_to_string(folder.join("log.txt")).unwrap_or_default();
+        if let Some(status) = sculpt.0.try_wait().expect("a child can be waited for") {
+            let said = said();
+            if said.contains("there is no graphics adapter") {
+                return skip("there is no graphics adapter");
+            }
+            panic!("sculpt has ended with {status}:\n{said}");
+        }
+        let colors = fs::read(folder.join("Xvfb_screen0")).map_or(0, |dump| colors_of_dump(&dump));
+        if colors > 1000 {
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(300), "after 5 minutes {colors} colours:\n{}", said());
+    }
+}
+
+/// A process that ends with the test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// How many different colours a window dump (XWD, 32 bits a pixel) has.
+fn colors_of_dump(dump: &[u8]) -> usize {
+    let word =
+        |index: usize| dump.get(4 * index..4 * index + 4).map_or(0, |b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
+    // The header's size, and the colour map's entries of 12 bytes.
+    let pixels = word(0) as usize + 12 * word(19) as usize;
+    dump.get(pixels..).unwrap_or_default().chunks_exact(4).collect::<HashSet<_>>().len()
+}
+
+fn skip(reason: &str) {
+    assert!(std::env::var_os("MARCHLESS_REQUIRE_PICTURES").is_none_or(|v| v != "1"), "no picture, since {reason}");
+    println!("Skipped: {reason}.");
+}
+
+/// Runs `command`, which renders a picture, and returns what it says; nothing where the test must be skipped.
+fn render(command: &mut Command) -> Option<String> {
+    let output = command.output().expect("the example can be run");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    if errors.contains("there is no graphics adapter") {
+        skip("there is no graphics adapter");
+        return None;
+    }
+    assert!(output.status.success(), "{command:?} has ended with {}:\n{errors}", output.status);
+    Some(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+fn sculpt(name: &str, flags: &[&str]) -> Option<(Picture, Vec<Disc>)> {
+    let path = picture_path(name);
+    let said = render(example("sculpt").args(["--size", SIZE]).args(flags).arg("--screenshot").arg(&path))?;
+    Some((Picture::read(&path), said.lines().filter_map(Disc::parse).collect()))
+}
+
+fn picture_path(name: &str) -> PathBuf {
+    let folder = std::env::var_os("MARCHLESS_PICTURES").map_or_else(folder_of_tests, PathBuf::from);
+    fs::create_dir_all(&folder).expect("the folder of pictures can be made");
+    fs::canonicalize(folder).expect("it is there").join(format!("{name}.png"))
+}
+
+fn height_map() -> PathBuf {
+    if let Some(data) = std::env::var_os("MARCHLESS_TEST_DATA") {
+        let path = PathBuf::from(data).join("jacksboro_dem.png");
+        if path.exists() {
+            return path;
+        }
+    }
+    println!("A generated height map, since MARCHLESS_TEST_DATA names no folder with jacksboro_dem.png.");
+    let path = folder_of_tests().join("generated_dem.png");
+    let (width, height) = (400u32, 340u32);
+    let samples = (0..width * height).flat_map(|index| {
+        let [x, z] = [index % width, index / width].map(|v| v as f32 / 60.0);
+        let elevation = 600.0 + 260.0 * x.sin() * (0.8 * z).cos() + 90.0 * (2.7 * x + 1.9 * z).sin();
+        (elevation as u16).to_be_bytes()
+    });
+    let file = BufWriter::new(File::create(&path).expect("the folder of tests can be written"));
+    let mut encoder = png::Encoder::new(file, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let mut writer = encoder.write_header().expect("a header");
+    writer.write_image_data(&samples.collect::<Vec<u8>>()).expect("as many samples as the header says");
+    path
+}
+
+/// Of the disc at least 30 % of the pixels change, elsewhere at most 1 %.
+fn assert_only_disc_changed(before: &Picture, after: &Picture, discs: &[Disc]) {
+    let [disc] = discs else { panic!("{} balls were dug", discs.len()) };
+    assert!(disc.radius > 4.0, "a ball of {} pixels is too small to see", disc.radius);
+    let mut counts = [[0u32; 2]; 2];
+    for (index, (a, b)) in before.pixels.iter().zip(&after.pixels).enumerate() {
+        let [dx, dy] = [(index % before.width) as f32 + 0.5 - disc.x, (index / before.width) as f32 + 0.5 - disc.y];
+        let distance = dx.hypot(dy);
+        // The crater's rim is soft.
+        if distance > disc.radius && distance < disc.radius + 3.0 {
+            continue;
+        }
+        let changed = (0..3).any(|channel| a[channel].abs_diff(b[channel]) > 8);
+        counts[usize::from(distance <= disc.radius)][usize::from(changed)] += 1;
+    }
+    let share = |[same, changed]: [u32; 2]| f64::from(changed) / f64::from((same + changed).max(1));
+    let [outside, inside] = counts.map(share);
+    assert!(inside >= 0.30, "of the disc only {:.1} % have changed", 100.0 * inside);
+    assert!(outside <= 0.01, "elsewhere {:.2} % have changed", 100.0 * outside);
+}
+
+impl Disc {
+    /// From a line such as `Dug a ball at 160,90 of 24 pixels radius.`
+    fn parse(line: &str) -> Option<Self> {
+        let (place, radius) = line.strip_prefix("Dug a ball at ")?.split_once(" of ")?;
+        let (x, y) = place.split_once(',')?;
+        let radius = radius.strip_suffix(" pixels radius.")?;
+        Some(Self { x: x.parse().ok()?, y: y.parse().ok()?, radius: radius.parse().ok()? })
+    }
+}
+
+impl Picture {
+    fn read(path: &Path) -> Self {
+        let file = BufReader::new(File::open(path).expect("the picture was written"));
+        let mut reader = png::Decoder::new(file).read_info().expect("it is a PNG picture");
+        let mut bytes = vec![0; reader.output_buffer_size().expect("it is small")];
+        let info = reader.next_frame(&mut bytes).expect("it is whole");
+        assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
+        let pixels = bytes[..info.buffer_size()].chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        Self { width: info.width as usize, pixels }
+    }
+
+    /// Neither black nor uniform: sky above, something else below, and many colours.
+    fn assert_is_a_landscape(&self) {
+        let mean = |pixels: &[[u8; 3]]| {
+            let sum = |channel: usize| pixels.iter().map(|pixel| f64::from(pixel[channel])).sum::<f64>();
+            [0, 1, 2].map(|channel| sum(channel) / pixels.len() as f64)
+        };
+        let tenth = self.pixels.len() / 10;
+        let [above, middle] = [mean(&self.pixels[..tenth]), mean(&self.pixels[5 * tenth..7 * tenth])];
+        let difference: f64 = (0..3).map(|channel| (above[channel] - middle[channel]).abs()).sum();
+        let colors = self.pixels.iter().collect::<HashSet<_>>().len();
+        assert!(above.iter().sum::<f64>() > 90.0, "the sky is black: {above:.0?}");
+        assert!(middle.iter().sum::<f64>() > 45.0, "the ground is black: {middle:.0?}");
+        assert!(difference > 30.0, "ground and sky are alike: {middle:.0?} and {above:.0?}");
+        assert!(colors > 200, "there are only {colors} colours");
+    }
+}
