@@ -1,4 +1,51 @@
 //! Smooth terrain that players can dig, as one Bevy plugin.
+//!
+//! ```
+//! use bevy_app::prelude::*;
+//! use bevy_ecs::prelude::*;
+//! use bevy_marchless::prelude::*;
+//! use bevy_math::Vec3;
+//!
+//! fn main() {
+//!     let mut app = App::new();
+//!     // `DefaultPlugins` in a game; a server needs no more than this.
+//!     app.add_plugins((TaskPoolPlugin::default(), bevy_transform::TransformPlugin, MarchlessPlugins));
+//!     app.add_systems(Startup, setup).add_systems(Update, dig);
+//!     app.update();
+//! }
+//!
+//! /// Hills, about 40 voxels high.
+//! fn setup(mut commands: Commands) {
+//!     commands.spawn(Terrain::new(|[x, y, z]: [f64; 3]| y - 40.0 - 8.0 * (x * 0.05).sin() * (z * 0.04).cos()));
+//! }
+//!
+//! fn dig(terrain: Single<Entity, With<Terrain>>, mut stamps: MessageWriter<Stamp>) {
+//!     stamps.write(Stamp::dig(*terrain, BrushShape::sphere(Vec3::new(128.0, 40.0, 128.0), 6.0)));
+//! }
+//! ```
+//!
+//! # How it works
+//! A [`Terrain`](terrain::Terrain) is filled from its [`Source`](source::Source), chunk by chunk, in tasks. Its
+//! samples live in one place, its [`TerrainVolume`](terrain::TerrainVolume), which [`Stamp`](brush::Stamp) messages change;
+//! [`Chunk`](chunk::Chunk) entities, its children, mirror what is drawn. All chunks that an edit changes are
+//! meshed from one snapshot and shown in one update, a small edit in the update that reads its stamp. A
+//! [`TerrainQuery`](query::TerrainQuery) tells what a ray hits. Everything runs in `PostUpdate`
+//! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame.
+//!
+//! # What is guaranteed
+//! - The same stamps in the same order give the same samples, bit for bit, on any machine, whatever the threads do; what a
+//!   source gives is up to its floating point.
+//! - Neighbouring chunks share their borders bit for bit, and never show different states of an edit.
+//! - Bad settings, stamps, rays and sources that panic are refused or reported; the game goes on.
+//!
+//! # What is not
+//! - A terrain has a fixed extent and one level of detail. Edits are neither saved nor undone.
+//! - Samples are changed on the main thread: a brush over 50 voxels in radius takes many milliseconds.
+//! - With Bevy's `RenderAssetBytesPerFrame` below what a group needs, its meshes may reach the screen frames apart.
+//!
+//! # Features
+//! `pbr` (materials), `gizmos` (bounds of chunks), `noise` and `png` (sources); all are on by default. Without them, and
+//! without any renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
 
 pub mod brush;
 pub mod chunk;

@@ -19,18 +19,17 @@ use bevy_camera::visibility::NoAutoAabb;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
+use marchless::Chunk;
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
 pub(crate) use job::{Colors, Meshed};
 use job::{MeshJob, mesh_now};
 
-use marchless::Chunk;
-
 use crate::chunk::{ChunkGeometry, mesh_bounds};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
 use crate::stats::Stats;
 use crate::terrain::{Group, Pending, TerrainVolume, around, distance_to_middle};
-use crate::work::{Priority, Results, WorkQueue, start_work};
+use crate::work::{Priority, Results, WorkQueue};
 
 /// The number of a vertex's material, a `u32`, for shaders.
 pub const ATTRIBUTE_MATERIAL: MeshVertexAttribute =
@@ -47,10 +46,7 @@ impl Plugin for MeshingPlugin {
             .register_type::<ChunkSamples>()
             .register_type::<NoAutoAabb>()
             .add_observer(handmade::forget_removed_samples)
-            .add_systems(
-                PostUpdate,
-                (mesh_terrains, handmade::mesh_samples, start_work).chain().in_set(MarchlessSystems::Mesh),
-            );
+            .add_systems(PostUpdate, (mesh_terrains, handmade::mesh_samples).chain().in_set(MarchlessSystems::Mesh));
     }
 }
 
@@ -187,6 +183,9 @@ impl Start<'_, '_, '_> {
                 let colors = self.screen.assets.is_some().then(|| colors.clone());
                 jobs.push(MeshJob { position, samples, settings, colors });
             }
+        }
+        if group.members == 0 {
+            return;
         }
         if jobs.len() <= self.inline {
             for meshed in mesh_now(jobs) {

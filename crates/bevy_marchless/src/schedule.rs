@@ -7,7 +7,7 @@ use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
 
 use crate::stats::{Stats, count_update};
-use crate::work::WorkQueue;
+use crate::work::{WorkQueue, start_work};
 
 /// The plugin's systems. All of them run in [`PostUpdate`], before transforms are propagated and asset events are
 /// sent, so that what is written in `Update` shows in the same frame.
@@ -79,6 +79,7 @@ impl Plugin for SchedulePlugin {
                 PostUpdate,
                 (ReadStamps, Work).chain().before(TransformSystems::Propagate).before(AssetEventSystems),
             )
-            .configure_sets(PostUpdate, (Prepare, Fill, Edit, Mesh, Report).chain().in_set(Work));
+            .configure_sets(PostUpdate, (Prepare, Fill, Edit, Mesh, Report).chain().in_set(Work))
+            .add_systems(PostUpdate, start_work.in_set(Work).after(Mesh).before(Report));
     }
 }

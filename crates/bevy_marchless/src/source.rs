@@ -17,7 +17,7 @@
 //! only the sign matters. Positions are in world units in the terrain's own space, whose origin is the terrain's lowest
 //! corner and in which y points up.
 //!
-//! Materials come from the source too: an [`Sdf`] has one per shape, the others take theirs from a list of [`Stratum`].
+//! Materials come from the source too: an [`Sdf`] has one per shape, noise and height maps take theirs from a list of [`Stratum`].
 //!
 //! Sources are floating point: they promise the same samples on the same machine and build, and nothing across
 //! machines.
@@ -30,7 +30,7 @@ mod height_map;
 mod noise;
 mod sdf;
 #[cfg_attr(
-    not(any(feature = "noise", feature = "png")),
+    not(any(feature = "noise", feature = "png", test)),
     expect(dead_code, reason = "only the sources of these features look at strata")
 )]
 mod strata;
@@ -45,6 +45,7 @@ pub use marchless::{Bound, Source, SourceRegion};
 #[cfg(feature = "noise")]
 pub use noise::{Fractal, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings};
 pub use sdf::Sdf;
+#[cfg(any(feature = "noise", feature = "png"))]
 pub use strata::Stratum;
 
 /// Nothing but air: an empty space to draw in, or what a cleared terrain is made of.
@@ -126,7 +127,9 @@ pub(crate) fn rows<'a>(
 
 /// Registers the sources and their settings for reflection.
 pub(crate) fn register_types(app: &mut App) {
-    app.register_type::<Air>().register_type::<Sdf>().register_type::<Stratum>();
+    app.register_type::<Air>().register_type::<Sdf>();
+    #[cfg(any(feature = "noise", feature = "png"))]
+    app.register_type::<Stratum>();
     #[cfg(feature = "noise")]
     app.register_type::<Fractal>()
         .register_type::<NoiseHeights>()

@@ -23,3 +23,22 @@ fn the_union_of_the_chunks_is_closed() {
     assert_ne!(report_after.triangles, report_before.triangles);
     assert_drawn(&mut app, terrain);
 }
+
+#[test]
+fn chunks_share_positions_and_normals_on_their_borders() {
+    let mut app = app();
+    let terrain = settled(&mut app, ball());
+    app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::new(15.0, 20.0, 9.0), 6.0)));
+    settle(&mut app, terrain);
+    let mut normals = std::collections::HashMap::new();
+    let mut shared = 0;
+    for (chunk, mesh) in geometry(&mut app, terrain) {
+        for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+            let position = (Vec3::from(*position) + (chunk * 16).as_vec3()).to_array().map(f32::to_bits);
+            let normal = normal.map(f32::to_bits);
+            shared += usize::from(normals.contains_key(&position));
+            assert_eq!(*normals.entry(position).or_insert(normal), normal);
+        }
+    }
+    assert!(shared > 200, "only {shared} vertices are shared");
+}

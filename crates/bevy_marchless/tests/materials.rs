@@ -1,0 +1,64 @@
+//! Chunks are drawn with their terrain's material.
+#![cfg(feature = "pbr")]
+
+mod common;
+
+use bevy_app::App;
+use bevy_asset::{AssetApp as _, Assets, Handle};
+use bevy_ecs::prelude::*;
+use bevy_marchless::prelude::*;
+use bevy_pbr::decal::ForwardDecalMaterial;
+use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
+use common::*;
+
+type Other = ForwardDecalMaterial<StandardMaterial>;
+
+fn app_with_materials() -> App {
+    let mut app = app();
+    app.init_asset::<StandardMaterial>().init_asset::<Other>();
+    app.add_plugins(TerrainMaterialPlugin::<Other>::default());
+    app
+}
+
+/// The materials of one type that chunks have.
+fn materials<M: Material>(app: &mut App) -> Vec<Handle<M>> {
+    let mut chunks = app.world_mut().query_filtered::<&MeshMaterial3d<M>, With<Chunk>>();
+    chunks.iter(app.world()).map(|material| material.0.clone()).collect()
+}
+
+fn add_standard(app: &mut App) -> Handle<StandardMaterial> {
+    app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default())
+}
+
+#[test]
+fn chunks_follow_their_terrains_material() {
+    let mut app = app_with_materials();
+    let (red, blue) = (add_standard(&mut app), add_standard(&mut app));
+    let terrain = app.world_mut().spawn((ball(), MeshMaterial3d(red.clone()))).id();
+    app.update();
+    assert_eq!(materials(&mut app), vec![red; 8]);
+    app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(blue.clone()));
+    app.update();
+    assert_eq!(materials(&mut app), vec![blue; 8]);
+}
+
+#[test]
+fn a_terrain_without_material_gets_a_plain_one_until_it_has_its_own() {
+    let mut app = app_with_materials();
+    let terrain = app.world_mut().spawn(ball()).id();
+    app.update();
+    assert_eq!(materials::<StandardMaterial>(&mut app).len(), 8);
+    app.world_mut().entity_mut(terrain).insert(MeshMaterial3d::<Other>::default());
+    app.update();
+    assert_eq!(materials::<Other>(&mut app).len(), 8);
+    assert_eq!(materials::<StandardMaterial>(&mut app).len(), 0);
+}
+
+#[test]
+fn another_type_of_material_is_left_alone() {
+    let mut app = app_with_materials();
+    app.world_mut().spawn((ball(), MeshMaterial3d::<Other>::default()));
+    app.update();
+    assert_eq!(materials::<Other>(&mut app).len(), 8);
+    assert_eq!(materials::<StandardMaterial>(&mut app).len(), 0);
+}
