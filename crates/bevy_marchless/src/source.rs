@@ -29,10 +29,7 @@ mod height_map;
 #[cfg(feature = "noise")]
 mod noise;
 mod sdf;
-#[cfg_attr(
-    not(any(feature = "noise", feature = "png", test)),
-    expect(dead_code, reason = "only the sources of these features look at strata")
-)]
+#[cfg(any(feature = "noise", feature = "png"))]
 mod strata;
 
 use bevy_app::App;
