@@ -21,16 +21,16 @@ use super::{SourceError, check, check_length, check_position};
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 pub struct HeightMapSettings {
-    /// Metres per pixel along x (a row of the picture) and z (a column). [Limit: > 0] [Default: 1, 1]
+    /// Metres per pixel along x (a row of the picture) and z (a column). Limit: > 0. Default: 1, 1.
     pub metres_per_pixel: DVec2,
-    /// Metres of height per unit of the samples. [Limit: > 0] [Default: 1]
+    /// Metres of height per unit of the samples. Limit: > 0. Default: 1.
     pub metres_per_unit: f64,
-    /// How many times higher than it is the ground is drawn. [Limit: > 0] [Default: 1]
+    /// How many times higher than it is the ground is drawn. Limit: > 0. Default: 1.
     pub exaggeration: f64,
     /// The height of the lowest sample above the terrain's lowest corner, so that there is something to dig into.
-    /// [Units: world] [Default: none, eight of the default voxels]
+    /// Units: world. Default: none, eight of the default voxels.
     pub floor: Option<f64>,
-    /// The ground's materials. [Default: none, material 0 throughout]
+    /// The ground's materials. Default: none, material 0 throughout.
     pub strata: Vec<Stratum>,
 }
 
@@ -127,22 +127,22 @@ impl HeightMap {
         self.size
     }
 
-    /// How far the map reaches along x and z. [Units: world]
+    /// How far the map reaches along x and z. Units: world.
     pub fn size_in_world(&self) -> DVec2 {
         DVec2::new(f64::from(self.size[0]), f64::from(self.size[1])) * self.settings.metres_per_pixel
     }
 
-    /// The height of the lowest sample: the floor. [Units: world]
+    /// The height of the lowest sample: the floor. Units: world.
     pub fn min_height(&self) -> f64 {
         self.floor
     }
 
-    /// The height of the highest sample; between samples the ground may rise a little more. [Units: world]
+    /// The height of the highest sample; between samples the ground may rise a little more. Units: world.
     pub fn max_height(&self) -> f64 {
         self.world_height(f64::from(self.highest))
     }
 
-    /// The height of the ground at a position. [Units: world]
+    /// The height of the ground at a position. Units: world.
     pub fn height(&self, x: f64, z: f64) -> f64 {
         let [x, z] = self.in_pixels(x, z);
         let [(x, x_weights), (z, z_weights)] = [x, z].map(catmull_rom);
@@ -150,7 +150,7 @@ impl HeightMap {
         self.world_height((z..).zip(z_weights).map(|(row, weight)| weight * along_x(row)).sum())
     }
 
-    /// The voxel size that makes the map's longer side 512 voxels. [Units: world]
+    /// The voxel size that makes the map's longer side 512 voxels. Units: world.
     pub fn default_voxel_size(&self) -> f64 {
         self.size_in_world().max_element() / Self::DEFAULT_VOXELS
     }

@@ -16,15 +16,15 @@ use super::{ROOM, SourceError, check, check_length, check_position, rows, world_
 pub struct Fractal {
     /// Another seed, another world.
     pub seed: u32,
-    /// How many octaves are added up. [Limit: 1..=16] [Default: 5]
+    /// How many octaves are added up. Limit: 1..=16. Default: 5.
     pub octaves: u32,
-    /// The size of the largest features. [Units: world] [Limit: > 0] [Default: 120]
+    /// The size of the largest features. Units: world. Limit: > 0. Default: 120.
     pub zoom: f64,
-    /// How strong each octave is, as a share of the one before. [Limit: > 0, <= 1] [Default: 0.45]
+    /// How strong each octave is, as a share of the one before. Limit: > 0, <= 1. Default: 0.45.
     pub persistence: f64,
-    /// How many times finer each octave is than the one before. [Limit: 1..=8] [Default: 2]
+    /// How many times finer each octave is than the one before. Limit: 1..=8. Default: 2.
     pub lacunarity: f64,
-    /// Folds the noise, so that it has sharp ridges of 1 where it otherwise passes through 0. [Default: false]
+    /// Folds the noise, so that it has sharp ridges of 1 where it otherwise passes through 0. Default: false.
     pub ridged: bool,
 }
 
@@ -111,9 +111,9 @@ pub struct NoiseHeightsSettings {
     /// The noise; its `zoom` is about the distance between hills.
     pub noise: Fractal,
     /// The height in the middle between the highest and the lowest possible. [Units: world, from the terrain's lowest
-    /// corner] [Default: 56]
+    /// corner] Default: 56.
     pub base: f64,
-    /// How far heights reach above and below the base at most. [Units: world] [Limit: >= 0] [Default: 52]
+    /// How far heights reach above and below the base at most. Units: world. Limit: >= 0. Default: 52.
     pub amplitude: f64,
     /// The ground's materials. [Default: material 2 from 5 units of depth and where it is steeper than 1, material 1
     /// from 1.5 units of depth, and 0 on top]
@@ -182,7 +182,7 @@ impl NoiseHeights {
         &self.settings
     }
 
-    /// The height of the ground at a position. [Units: world]
+    /// The height of the ground at a position. Units: world.
     pub fn height(&self, x: f64, z: f64) -> f64 {
         self.settings.base + self.settings.amplitude * self.octaves.get([x, z])
     }
@@ -222,12 +222,12 @@ pub struct NoiseDensitySettings {
     /// The noise; its `zoom` is about the distance between caves.
     pub noise: Fractal,
     /// There is ground where the noise is below this: at −1 none, at 0 in half of the space, at 1 in all of it.
-    /// [Default: 0.15]
+    /// Default: 0.15.
     pub threshold: f64,
-    /// Hills above which there is only air; their strata are not used. [Default: none, ground in all directions]
+    /// Hills above which there is only air; their strata are not used. Default: none, ground in all directions.
     pub ground: Option<NoiseHeightsSettings>,
     /// The ground's materials. Depth is the estimated distance to the nearest surface, a cave's too.
-    /// [Default: as of [`NoiseHeightsSettings::strata`]]
+    /// Default: as of [`NoiseHeightsSettings::strata`.]
     pub strata: Vec<Stratum>,
 }
 

@@ -31,7 +31,7 @@ pub enum Sdf {
     Sphere {
         /// Its middle.
         center: DVec3,
-        /// How far it reaches. [Limit: > 0]
+        /// How far it reaches. Limit: > 0.
         radius: f64,
         /// What it is made of.
         material: u8,
@@ -40,7 +40,7 @@ pub enum Sdf {
     Box {
         /// Its middle.
         center: DVec3,
-        /// From the middle to its faces. [Limit: > 0]
+        /// From the middle to its faces. Limit: > 0.
         half_size: DVec3,
         /// What it is made of.
         material: u8,
@@ -51,7 +51,7 @@ pub enum Sdf {
         a: DVec3,
         /// The other end.
         b: DVec3,
-        /// How far from the line it reaches. [Limit: > 0]
+        /// How far from the line it reaches. Limit: > 0.
         radius: f64,
         /// What it is made of.
         material: u8,
@@ -60,9 +60,9 @@ pub enum Sdf {
     Torus {
         /// The middle of the hole.
         center: DVec3,
-        /// From the middle to the middle of the tube. [Limit: > 0]
+        /// From the middle to the middle of the tube. Limit: > 0.
         major: f64,
-        /// The tube's radius. [Limit: > 0]
+        /// The tube's radius. Limit: > 0.
         minor: f64,
         /// What it is made of.
         material: u8,
@@ -71,7 +71,7 @@ pub enum Sdf {
     HalfSpace {
         /// A point on the plane.
         point: DVec3,
-        /// Away from the solid side. [Limit: length 1]
+        /// Away from the solid side. Limit: length 1.
         normal: DVec3,
         /// What it is made of.
         material: u8,
@@ -82,7 +82,7 @@ pub enum Sdf {
     SmoothUnion {
         /// What is joined.
         parts: Vec<Sdf>,
-        /// How far from a seam the filling reaches. [Limit: > 0]
+        /// How far from a seam the filling reaches. Limit: > 0.
         radius: f64,
     },
     /// Whatever lies in all parts, of the first one's material. An intersection of nothing is air.
@@ -201,7 +201,7 @@ impl Sdf {
 
     /// The distance to the surface (negative inside; a lower bound of it for combined shapes) and the material.
     ///
-    /// [Units: world]
+    /// Units: world.
     pub fn sample(&self, position: DVec3) -> (f64, u8) {
         let (distance, material) = match self {
             Self::Sphere { center, radius, material } => (position.distance(*center) - radius, *material),

@@ -24,12 +24,12 @@ use bevy_reflect::std_traits::ReflectDefault;
 pub struct Stratum {
     /// What the ground is made of here.
     pub material: u8,
-    /// Holds at this depth below the surface and deeper. [Units: world] [Default: 0, everywhere]
+    /// Holds at this depth below the surface and deeper. Units: world. Default: 0, everywhere.
     pub below_depth: f64,
-    /// Holds at this height and above. [Units: world, from the terrain's lowest corner] [Default: −∞, everywhere]
+    /// Holds at this height and above. Units: world, from the terrain's lowest corner. Default: −∞, everywhere.
     pub above_height: f64,
-    /// Holds where the surface above is this steep or steeper. [Units: rise per run, 1 is 45°; ∞ in a ceiling]
-    /// [Default: 0, everywhere]
+    /// Holds where the surface above is this steep or steeper. Units: rise per run, 1 is 45°; ∞ in a ceiling.
+    /// Default: 0, everywhere.
     pub steeper_than: f64,
 }
 
