@@ -37,7 +37,8 @@ pub struct FlyCameraPlugin;
 
 impl Plugin for FlyCameraPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Update, (grab_mouse.in_set(GrabMouse), turn.run_if(mouse_is_grabbed), fly).chain());
+        let turn = turn.run_if(mouse_is_grabbed);
+        app.add_systems(Update, (free_mouse, grab_mouse.in_set(GrabMouse), turn, fly).chain());
     }
 }
 
@@ -50,17 +51,23 @@ pub fn mouse_is_grabbed(cursor: Query<&CursorOptions, With<PrimaryWindow>>) -> b
     cursor.iter().any(|cursor| cursor.grab_mode != CursorGrabMode::None)
 }
 
-fn grab_mouse(
-    buttons: Res<ButtonInput<MouseButton>>,
-    keys: Res<ButtonInput<KeyCode>>,
-    mut windows: Query<(&Window, &mut CursorOptions), With<PrimaryWindow>>,
-) {
+fn free_mouse(keys: Res<ButtonInput<KeyCode>>, mut windows: Query<(&Window, &mut CursorOptions), With<PrimaryWindow>>) {
     for (window, mut cursor) in &mut windows {
         let grabbed = cursor.grab_mode != CursorGrabMode::None;
         if grabbed && (keys.just_pressed(KeyCode::Escape) || !window.focused) {
             cursor.grab_mode = CursorGrabMode::None;
             cursor.visible = true;
-        } else if !grabbed && window.focused && buttons.just_pressed(MouseButton::Left) {
+        }
+    }
+}
+
+fn grab_mouse(
+    buttons: Res<ButtonInput<MouseButton>>,
+    mut windows: Query<(&Window, &mut CursorOptions), With<PrimaryWindow>>,
+) {
+    for (window, mut cursor) in &mut windows {
+        let grabbed = cursor.grab_mode != CursorGrabMode::None;
+        if !grabbed && window.focused && buttons.just_pressed(MouseButton::Left) {
             cursor.grab_mode = CursorGrabMode::Locked;
             cursor.visible = false;
         }

@@ -50,6 +50,8 @@ pub fn build(add_plugins: impl FnOnce(&mut App)) -> Result<App, NoGraphics> {
         } else if message.contains("Unable to find a GPU") {
             NoGraphics::Adapter
         } else {
+            // The hook has kept silent about it.
+            eprintln!("{message}");
             panic::resume_unwind(payload)
         }
     })

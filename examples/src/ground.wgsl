@@ -50,7 +50,7 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
     let height = p.y + (large - 0.5) * 0.22 * (ground.heights.y - ground.heights.x);
 
     // Rock, also of the materials that one digs out and builds.
-    let stone = mix(ground.dark_rock.rgb, ground.rock.rgb, layers(p, large, middle)) * (0.75 + 0.5 * middle);
+    let stone = mix(ground.dark_rock.rgb, ground.rock.rgb, layers(p, large, middle)) * (0.65 + 0.7 * middle);
     let own = in.color.rgb * mix(0.82, 1.12, layers(p, large, middle)) * (0.8 + 0.4 * middle);
 
     // Natural ground: meadow with woods, sand below, snow above, rock where it is steep.
@@ -67,7 +67,7 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
     natural = mix(natural, ground.snow.rgb, snow);
 
     var color = mix(natural, own, clamp(in.color.a, 0.0, 1.0));
-    color *= 0.86 + 0.28 * fine;
+    color *= 0.76 + 0.48 * fine;
 
     // Small bumps nearby.
     let close = 1.0 - smoothstep(40.0, 220.0, distance);

@@ -3,6 +3,7 @@
 use bevy::asset::uuid_handle;
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
+use bevy::pbr::wireframe::NoWireframe;
 use bevy::prelude::*;
 use bevy::render::render_resource::{AsBindGroup, ShaderType};
 use bevy::shader::{Shader, ShaderRef};
@@ -71,6 +72,7 @@ fn spawn_sky(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut mater
         Mesh3d(meshes.add(Sphere::new(RADIUS).mesh().uv(32, 16).scaled_by(Vec3::new(-1.0, 1.0, 1.0)))),
         MeshMaterial3d(materials.add(SkyMaterial::new(&LOOKS[0]))),
         NoFrustumCulling,
+        NoWireframe,
         NotShadowCaster,
         NotShadowReceiver,
     ));

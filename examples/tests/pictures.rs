@@ -47,7 +47,7 @@ fn a_height_map_can_be_dug() {
     // Fewer voxels than by default: this is about the picture.
     let flags = [flags.as_slice(), &["--voxel-size", "120"]].concat();
     let Some((before, _)) = sculpt("height_map", &flags) else { return };
-    let Some((after, discs)) = sculpt("height_map_dug", &[&flags[..], &["--dig", "0.5,0.6,12"]].concat()) else {
+    let Some((after, discs)) = sculpt("height_map_dug", &[&flags[..], &["--dig", "0.4,0.8,14"]].concat()) else {
         return;
     };
     before.assert_is_a_landscape();

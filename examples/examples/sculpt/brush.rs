@@ -6,12 +6,13 @@ use bevy::input::mouse::AccumulatedMouseScroll;
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::pbr::wireframe::NoWireframe;
 use bevy::prelude::*;
+use bevy::window::{CursorOptions, PrimaryWindow};
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::{FlyCamera, GrabMouse, mouse_is_grabbed};
 use marchless_examples::look::MATERIALS;
 
-use crate::world::{Kind, World};
+use crate::world::World;
 
 /// The brush, and what it is doing.
 #[derive(Resource, Debug)]
@@ -110,7 +111,7 @@ fn press_keys(keys: Res<ButtonInput<KeyCode>>, mut brush: ResMut<Brush>, mut wor
         world.shuffle();
     }
     if keys.just_pressed(KeyCode::KeyC) {
-        world.kind = Kind::Air;
+        world.clear();
     }
 }
 
@@ -139,15 +140,16 @@ fn stroke(
     time: Res<Time>,
     buttons: Res<ButtonInput<MouseButton>>,
     terrain: Single<Entity, With<Terrain>>,
-    grabbed: Query<&bevy::window::CursorOptions>,
+    cursor: Query<&CursorOptions, With<PrimaryWindow>>,
     mut brush: ResMut<Brush>,
     mut stamps: MessageWriter<Stamp>,
 ) {
-    if brush.stroke.is_some_and(|held| !buttons.pressed(held.button)) || !mouse_is_grabbed_by(&grabbed) {
+    let grabbed = mouse_is_grabbed(cursor);
+    if brush.stroke.is_some_and(|held| !buttons.pressed(held.button)) || !grabbed {
         brush.stroke = None;
     }
     let pressed = BUTTONS.iter().find(|(button, _)| buttons.just_pressed(*button));
-    if let (None, Some(&(button, operation)), true) = (brush.stroke, pressed, mouse_is_grabbed_by(&grabbed)) {
+    if let (None, Some(&(button, operation)), true) = (brush.stroke, pressed, grabbed) {
         brush.strokes += 1;
         brush.stroke = Some(Held { button, operation, time: Duration::ZERO });
     }
@@ -162,10 +164,6 @@ fn stroke(
         BrushOperation::Paint => Stamp::paint(*terrain, shape, brush.material),
     });
     brush.stroke = Some(Held { time: end, ..held });
-}
-
-fn mouse_is_grabbed_by(cursors: &Query<&bevy::window::CursorOptions>) -> bool {
-    cursors.iter().any(|cursor| cursor.grab_mode != bevy::window::CursorGrabMode::None)
 }
 
 fn show_ball(

@@ -4,6 +4,7 @@ use bevy::diagnostic::{DiagnosticPath, DiagnosticsStore, FrameTimeDiagnosticsPlu
 use bevy::ecs::system::SystemParam;
 use bevy::pbr::wireframe::WireframeConfig;
 use bevy::prelude::*;
+use bevy::window::{CursorOptions, PrimaryWindow};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::mouse_is_grabbed;
@@ -28,10 +29,17 @@ struct Panel<'w> {
 }
 
 /// `draft`: the world as the sliders stand; it becomes the world once the mouse lets go of them.
-fn show_panel(mut contexts: EguiContexts, mut panel: Panel, mut draft: Local<Option<World>>) -> Result {
+fn show_panel(
+    mut contexts: EguiContexts,
+    mut panel: Panel,
+    mut draft: Local<Option<World>>,
+    cursor: Query<&CursorOptions, With<PrimaryWindow>>,
+) -> Result {
     let context = contexts.ctx_mut()?;
     let mut world = draft.take().unwrap_or_else(|| panel.world.clone());
-    egui::Window::new("sculpt").default_pos([12.0, 12.0]).default_width(230.0).show(context, |ui| {
+    // A grabbed mouse digs, wherever its pointer may be.
+    let window = egui::Window::new("sculpt").interactable(!mouse_is_grabbed(cursor));
+    window.default_pos([12.0, 12.0]).default_width(230.0).show(context, |ui| {
         panel.brush(ui);
         ui.separator();
         panel.world(ui, &mut world);
@@ -88,7 +96,7 @@ impl Panel<'_> {
                 world.shuffle();
             }
             if ui.button("Clear (C)").clicked() {
-                world.kind = Kind::Air;
+                world.clear();
             }
         });
         ui.horizontal(|ui| {

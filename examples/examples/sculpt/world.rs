@@ -28,6 +28,8 @@ pub(crate) struct World {
     pub(crate) look: usize,
     /// The height map, if one was given.
     pub(crate) map: Option<Map>,
+    /// How many times it was made anew, so that what was dug is gone even where nothing else differs.
+    pub(crate) times: u32,
 }
 
 /// A height map and how large its voxels are.
@@ -86,7 +88,7 @@ impl World {
         let map = Map::new(args)?;
         let kind = if map.is_some() { Kind::HeightMap } else { Kind::Hills };
         let look = usize::from(args.look);
-        let world = Self { seed: args.seed, zoom: 150.0, octaves: 6, isovalue: 0.0, kind, look, map };
+        let world = Self { seed: args.seed, zoom: 150.0, octaves: 6, isovalue: 0.0, kind, look, map, times: 0 };
         world.terrain()?.check()?;
         Ok(world)
     }
@@ -127,10 +129,18 @@ impl World {
     /// Another world that looks otherwise.
     pub(crate) fn shuffle(&mut self) {
         self.seed = RandomState::new().build_hasher().finish() as u32;
+        self.times += 1;
         self.look = (self.look + 1 + self.seed as usize % (LOOKS.len() - 1)) % LOOKS.len();
-        if self.kind == Kind::Air {
+        // The others know no seed.
+        if !matches!(self.kind, Kind::Hills | Kind::Caves) {
             self.kind = Kind::Hills;
         }
+    }
+
+    /// Makes it of nothing but air.
+    pub(crate) fn clear(&mut self) {
+        self.times += 1;
+        self.kind = Kind::Air;
     }
 
     fn hills(&self) -> NoiseHeightsSettings {
