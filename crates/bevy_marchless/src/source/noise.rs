@@ -227,7 +227,7 @@ pub struct NoiseDensitySettings {
     /// Hills above which there is only air; their strata are not used. Default: none, ground in all directions.
     pub ground: Option<NoiseHeightsSettings>,
     /// The ground's materials. Depth is the estimated distance to the nearest surface, a cave's too.
-    /// Default: as of [`NoiseHeightsSettings::strata`.]
+    /// Default: as of [`NoiseHeightsSettings::strata`].
     pub strata: Vec<Stratum>,
 }
 
