@@ -81,6 +81,12 @@ fn rays_hit_what_is_drawn_not_what_will_be() {
         app.update();
     }
     assert!((height(&mut app) - 11.0).abs() < 0.3, "shown");
+
+    app.world_mut().get_mut::<Terrain>(terrain).unwrap().set_source(|[_, y, _]: [f64; 3]| y - 20.5);
+    app.update();
+    assert!((height(&mut app) - 11.0).abs() < 0.3, "still drawn");
+    settle(&mut app, terrain);
+    assert!((height(&mut app) - 20.5).abs() < 0.01, "drawn anew");
 }
 
 #[test]

@@ -79,8 +79,8 @@ fn refill(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, queue: 
     volume.unfilled = volume.chunks.len();
     for (&position, state) in &mut volume.chunks {
         let ticket = fill_chunk(entity, terrain, volume.filling, position, queue, results);
-        *state =
-            ChunkState { fill: Some(ticket), empty: state.empty, ..ChunkState::new(position, extent, state.entity) };
+        let new = ChunkState::new(position, extent, state.entity);
+        *state = ChunkState { fill: Some(ticket), drawn: state.drawn, empty: state.empty, ..new };
     }
 }
 
