@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 /// The example of that name, ready to run without much talk.
-pub fn example(name: &str) -> Command {
+pub(crate) fn example(name: &str) -> Command {
     let test = std::env::current_exe().expect("a test knows where it is");
     let folder = test.ancestors().nth(2).expect("tests lie in a folder beside the examples'").join("examples");
     let program = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
@@ -18,6 +18,6 @@ pub fn example(name: &str) -> Command {
 }
 
 /// A folder for what tests write.
-pub fn folder_of_tests() -> PathBuf {
+pub(crate) fn folder_of_tests() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
 }
