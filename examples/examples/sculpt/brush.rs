@@ -179,12 +179,18 @@ fn show_ball(
     visibility.set_if_neq(if place.is_some() { Visibility::Inherited } else { Visibility::Hidden });
     // A voxel is a world unit.
     *transform = Transform::from_translation(place.unwrap_or_default()).with_scale(Vec3::splat(brush.radius));
-    if let Some(mut material) = materials.get_mut(material) {
-        material.base_color = match brush.stroke.map(|held| held.operation) {
-            Some(BrushOperation::Dig) => Color::srgba(1.0, 0.45, 0.3, 0.25),
-            Some(_) => settings.palette.color(brush.material).with_alpha(0.4),
-            None => settings.palette.color(brush.material).mix(&Color::WHITE, 0.5).with_alpha(0.25),
-        };
+    // Brighter than white, so that it shows on snow as well.
+    let own = settings.palette.color(brush.material).to_linear();
+    let color = Color::from(match brush.stroke.map(|held| held.operation) {
+        Some(BrushOperation::Dig) => LinearRgba::new(2.5, 0.5, 0.2, 0.4),
+        Some(_) => (own * 2.0).with_alpha(0.5),
+        None => (own + LinearRgba::WHITE * 1.5).with_alpha(0.35),
+    });
+    // Not touched where it stays as it is, so that it is not uploaded every frame.
+    if materials.get(material).is_some_and(|material| material.base_color != color)
+        && let Some(mut material) = materials.get_mut(material)
+    {
+        material.base_color = color;
     }
 }
 
