@@ -15,7 +15,7 @@
 //! Simulations" (2010); the cases themselves go back to William E. Lorensen and Harvey E. Cline, "Marching Cubes: A High Resolution 3D
 //! Surface Construction Algorithm" (1987).
 
-use crate::cell::{CaseIndex, Edge, Face};
+use crate::cell::{CaseIndex, Corner, Edge, Face};
 
 /// Triangles of each case, 0–5.
 pub const TRIANGLE_COUNTS: [u8; 256] = CASES.counts;
@@ -23,6 +23,16 @@ pub const TRIANGLE_COUNTS: [u8; 256] = CASES.counts;
 /// The edges that hold the corners of each case's triangles, counter-clockwise as seen from outside; the first
 /// [`TRIANGLE_COUNTS`] entries count, the others are edge 0 three times.
 pub static TRIANGLES: [[[Edge; 3]; 5]; 256] = CASES.triangles;
+
+/// The two corners of each edge, the lower first.
+pub const EDGE_CORNERS: [[Corner; 2]; 12] = {
+    let (mut corners, mut edge) = ([Edge::ALL[0].corners(); 12], 0);
+    while edge < 12 {
+        corners[edge] = Edge::ALL[edge].corners();
+        edge += 1;
+    }
+    corners
+};
 
 /// The edges that the surface crosses in each case: bit `i` is edge `i`.
 pub const CROSSED_EDGES: [u16; 256] = {

@@ -17,6 +17,7 @@ use crate::buffer::MeshBuffer;
 use crate::lattice::Region;
 use crate::mesher::{MeshError, MeshSettings, Mesher};
 use crate::sample::{Voxel, Weight};
+use crate::source::Source;
 
 /// Cells per axis of a chunk where nothing else is asked for.
 pub const DEFAULT_CHUNK_CELLS: u32 = 32;
@@ -147,6 +148,28 @@ impl<W: Weight> Grid<W> {
         self.chunks.insert(position, chunk);
         self.mark_dirty(region);
         Ok(())
+    }
+
+    /// Samples `source` for the chunk at `position` ([`Chunk::from_source`]) and puts it there. `spacing`: world units per
+    /// voxel.
+    ///
+    /// ```
+    /// use marchless::{Grid, Region};
+    ///
+    /// let mut grid = Grid::<i16>::bounded(16, Region::new([0; 3], [2, 1, 2]))?;
+    /// let ground = |[_, y, _]: [f64; 3]| y - 7.5;
+    /// for chunk in Region::new([0; 3], [2, 1, 2]).points() {
+    ///     grid.fill(chunk, &ground, 1.0)?;
+    /// }
+    /// assert!(grid.get([8, 7, 8]).weight < 0 && grid.get([8, 8, 8]).weight > 0);
+    /// # Ok::<(), marchless::GridError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`GridError::OutOfBounds`]; nothing is sampled then.
+    pub fn fill(&mut self, position: [i32; 3], source: &(impl Source + ?Sized), spacing: f64) -> Result<(), GridError> {
+        self.check(position)?;
+        self.insert(position, Chunk::from_source(source, position, self.cells, spacing))
     }
 
     /// The chunk at `position`, where there is one.

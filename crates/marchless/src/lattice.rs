@@ -51,6 +51,9 @@ impl Shape {
     }
 
     /// The index of the sample at `position`, which must lie within the shape.
+    ///
+    /// # Panics
+    /// In debug builds, where it does not.
     pub const fn index(self, position: [u32; 3]) -> usize {
         debug_assert!(position[0] < self.0[0] && position[1] < self.0[1] && position[2] < self.0[2]);
         let [sx, sy, sz] = self.strides();

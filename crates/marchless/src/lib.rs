@@ -40,8 +40,9 @@
 //! - Within a chunk and across chunks the surface is closed, 2-manifold, consistently oriented and free of zero-area
 //!   triangles, on every input, ties with the isovalue included; vertices on a shared border are equal bit for bit.
 //! - The same samples give the same mesh, and the same stamps in the same order the same samples, bit for bit, on any machine.
-//! - No input panics: NaN and infinite samples have a meaning ([`Weight`]), and what cannot be meshed is a typed error.
-//! - Nothing is allocated once the buffers are warm.
+//! - No samples, stamps, rays or meshes panic: NaN and infinite samples have a meaning ([`Weight`]), and what cannot be
+//!   meshed is a typed error. (Constructors of a cell's parts say when they do.)
+//! - [`Mesher::mesh`] and [`Neighbourhood::mesh`] allocate nothing once their buffers are warm.
 //!
 //! # Not guaranteed
 //! - The topology of the trilinear interpolant: on a face whose corners alternate, inside corners are separated.
@@ -51,6 +52,7 @@
 //! # Features
 //! `std` (default) uses the standard library's square root instead of `libm`'s; the results are the same.
 #![no_std]
+#![deny(unsafe_code)]
 
 extern crate alloc;
 
@@ -75,7 +77,7 @@ pub use grid::{
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 pub use mesher::{MeshError, MeshSettings, Mesher};
-pub use query::*;
+pub use query::{RayHit, ray_cast, weight_at};
 pub use sample::{Voxel, Weight};
 pub use source::{Bound, Source, SourceRegion};
 pub use validate::MeshReport;

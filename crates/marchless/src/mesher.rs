@@ -36,6 +36,9 @@ pub(crate) use vertices::crossing_fraction;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshSettings {
     /// The surface lies where the weight equals this many voxels; samples below it are inside. Finite; default 0.
+    ///
+    /// Chunks that a [`Source`](crate::Source)'s bound spared from sampling hold no true distances: they suit isovalues
+    /// within ±3 voxels.
     pub isovalue: f32,
     /// Whether to compute normals; default true.
     pub normals: bool,

@@ -8,6 +8,8 @@ mod ray;
 #[cfg(test)]
 mod tests;
 
+use alloc::{collections::BTreeSet, vec::Vec};
+
 use crate::{
     cell::{CaseIndex, Corner, Edge},
     grid::{Chunk, Grid, border::Border},
@@ -36,7 +38,7 @@ pub struct RayHit {
 
 /// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no ray.
 ///
-/// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue. `origin`, `direction` and `max_distance` are in
+/// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue (in voxels). `origin`, `direction` and `max_distance` are in
 /// lattice units; the direction may have any length but 0, and the distance may be infinite. A ray along
 /// a triangle's plane or through its very edge may count as a hit or as a miss.
 ///
@@ -61,21 +63,32 @@ pub fn ray_cast<W: Weight>(
     }
     let ray = Ray::new(origin, direction, max_distance)?;
     let cells = i64::from(grid.chunk_cells());
-    for chunk in ray.walk(drawn_chunks(grid), cells) {
+    let drawn = drawn_chunks(grid);
+    let hit = |chunk| {
         let surface = Surface::new(grid, chunk, isovalue);
         if surface.is_empty() {
-            continue;
+            return None;
         }
-        let hit = ray.walk(grid.chunk_region(chunk), 1).find_map(|cell| surface.hit(&ray, cell));
-        if hit.is_some() {
-            return hit;
-        }
+        ray.walk(grid.chunk_region(chunk), 1).find_map(|cell| surface.hit(&ray, cell))
+    };
+    let positions = drawn.size().into_iter().map(u128::from).product::<u128>();
+    if positions <= SPARSE * (grid.chunks().count() as u128 + 1) {
+        return ray.walk(drawn, cells).find_map(hit);
     }
-    None
+    // Few chunks far apart: those that the ray enters, in the order in which it does.
+    let around = |position| Region::new(position, position).grown(1, 1).intersection(&drawn).points();
+    let candidates: BTreeSet<_> = grid.chunks().flat_map(|(position, _)| around(position)).collect();
+    let enters = |chunk: [i32; 3]| Some((ray.span(Region::new(chunk, chunk).grown(0, 1), cells)?.0, chunk));
+    let mut entered: Vec<_> = candidates.into_iter().filter_map(enters).collect();
+    entered.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    entered.into_iter().find_map(|(_, chunk)| hit(chunk))
 }
 
-/// The weight at any position, in voxels: trilinear between the eight lattice points around it. `None` where the position is not
-/// finite.
+/// Where there are more chunk positions than this for every chunk, it is not worth walking through all of them.
+const SPARSE: u128 = 27;
+
+/// The weight at any position, in voxels: trilinear between the eight lattice points around it; finite, infinite and NaN samples
+/// count as the farthest finite ones of their side. `None` where the position is not finite.
 ///
 /// `position`: in lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles,
 /// which the trilinear surface only comes close to.
@@ -93,7 +106,7 @@ pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
             if offset[axis] == 1 { high } else { 1.0 - high }
         });
         let point = [0, 1, 2].map(|axis| low[axis] as i32 + i32::from(offset[axis]));
-        share[0] * share[1] * share[2] * f64::from(grid.get(point).weight.to_voxels())
+        share[0] * share[1] * share[2] * grid.get(point).weight.finite() / f64::from(W::SCALE)
     });
     Some(weight.sum::<f64>() as f32)
 }

@@ -192,6 +192,19 @@ proptest! {
 }
 
 #[test]
+fn borders_hold_in_the_largest_chunks_and_at_any_isovalue() {
+    for cells in [32, 62] {
+        let bounds = Region::new([-1, 0, 0], [1, 1, 1]);
+        check_seams::<i16>(Field::Smooth, 5, cells, bounds, 0.0).expect("sound seams");
+    }
+    for isovalue in [-200.0, -10.0, 3.5, 100.0] {
+        let bounds = Region::new([0, -1, 0], [2, 1, 1]);
+        check_seams::<i16>(Field::Noise, 6, 9, bounds, isovalue).expect("sound seams");
+        check_seams::<f32>(Field::Smooth, 7, 9, bounds, isovalue).expect("sound seams");
+    }
+}
+
+#[test]
 fn a_full_grid_is_a_box_half_a_voxel_inside() {
     let bounds = Region::new([-1, 0, 2], [1, 1, 3]);
     let mut grid = Grid::<i16>::bounded(8, bounds).expect("a sound size");

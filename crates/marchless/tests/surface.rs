@@ -187,3 +187,52 @@ fn rows_of_4096_cells_are_sound() {
         assert!(report.is_clean() && report.triangles > 10_000, "{report}");
     }
 }
+
+/// A ball in a cube of samples.
+fn ball(size: u32) -> Vec<f32> {
+    let middle = (size as f32 - 1.0) / 2.0;
+    let axis = || (0..size).map(move |v| v as f32 - middle);
+    axis()
+        .flat_map(|z| axis().flat_map(move |y| axis().map(move |x| (x * x + y * y + z * z).sqrt() - 0.7 * middle)))
+        .collect()
+}
+
+#[test]
+fn what_cannot_be_meshed_is_a_typed_error_and_leaves_nothing() {
+    let cube = |size| Shape::cube(size).expect("small");
+    let weights = ball(8);
+    let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
+    let good = Samples::new(cube(8), &weights).expect("one weight a sample");
+    let mut refused = |samples: Samples<'_, f32>, isovalue, expected: &str| {
+        mesher.mesh(good, &MeshSettings::default(), &mut mesh).expect("a ball");
+        assert!(!mesh.is_empty());
+        let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+        let error = mesher.mesh(samples, &settings, &mut mesh).expect_err("it cannot be meshed");
+        assert_eq!(error.to_string(), expected);
+        assert_eq!(mesh, MeshBuffer::new());
+    };
+    refused(good, f32::NAN, "the isovalue must be finite, but it is NaN");
+    refused(good, f32::INFINITY, "the isovalue must be finite, but it is inf");
+    let flat = Samples::new(Shape::new([1, 2, 2]).expect("small"), &weights[..4]).expect("one weight a sample");
+    refused(flat, 0.0, "meshing needs at least 2 samples per axis, but there are 1 × 2 × 2");
+    let thin = Samples::new(cube(3), &weights[..27]).expect("one weight a sample").padded();
+    refused(thin, 0.0, "meshing needs at least 4 samples per axis, but there are 3 × 3 × 3");
+}
+
+#[test]
+fn a_reused_buffer_holds_only_what_was_asked_for() {
+    let (weights, materials) = (ball(12), vec![7; 12 * 12 * 12]);
+    let samples = Samples::new(Shape::cube(12).expect("small"), &weights).expect("one weight a sample");
+    let with_materials = samples.with_materials(&materials).expect("one material a sample");
+    let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
+    let mut lengths = |samples, normals| {
+        mesher.mesh(samples, &MeshSettings { normals, isovalue: 0.0 }, &mut mesh).expect("a ball");
+        [mesh.positions.len(), mesh.normals.len(), mesh.materials.len()]
+    };
+    let [count, ..] = lengths(with_materials, true);
+    assert!(count > 0);
+    assert_eq!(lengths(with_materials, true), [count, count, count]);
+    assert_eq!(lengths(samples, true), [count, count, 0]);
+    assert_eq!(lengths(with_materials, false), [count, 0, count]);
+    assert_eq!(lengths(samples, false), [count, 0, 0]);
+}

@@ -54,9 +54,9 @@ impl VolumeByMaterial {
         self.0.get(&material).copied().unwrap_or(0)
     }
 
-    /// The volume of all materials.
+    /// The volume of all materials; saturates.
     pub fn total(&self) -> u64 {
-        self.0.values().sum()
+        self.0.values().fold(0, |total, &volume| total.saturating_add(volume))
     }
 
     /// Whether there is no volume of any material.
@@ -69,14 +69,15 @@ impl VolumeByMaterial {
         self.0.iter().map(|(&material, &volume)| (material, volume))
     }
 
-    /// Adds `volume` of `material`.
+    /// Adds `volume` of `material`; saturates.
     pub fn add(&mut self, material: u8, volume: u64) {
         if volume > 0 {
-            *self.0.entry(material).or_default() += volume;
+            let sum = self.0.entry(material).or_default();
+            *sum = sum.saturating_add(volume);
         }
     }
 
-    /// Adds all of `other`'s volumes.
+    /// Adds all of `other`'s volumes; saturates.
     pub fn merge(&mut self, other: &Self) {
         for (material, volume) in other.iter() {
             self.add(material, volume);

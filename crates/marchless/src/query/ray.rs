@@ -12,7 +12,7 @@ pub(super) struct Ray {
 }
 
 impl Ray {
-    /// `None` where a number is NaN, the origin or direction is infinite, or the direction or length is no such.
+    /// `None` where a number is NaN, the origin or direction is infinite, the direction is zero, or the length is negative.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], max_distance: f64) -> Option<Self> {
         let is_finite = origin.iter().chain(&direction).all(|v| v.is_finite());
         let largest = direction.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
@@ -27,22 +27,31 @@ impl Ray {
         [0, 1, 2].map(|axis| self.origin[axis] + self.direction[axis] * distance)
     }
 
-    /// The cells of `region` that the ray passes, in order; cell `c` reaches from `c·size` to `(c + 1)·size`.
-    pub(super) fn walk(&self, region: Region, size: i64) -> impl Iterator<Item = [i32; 3]> {
-        let plane = move |cell: i32, side: i64| ((i64::from(cell) + side) * size) as f64;
-        // When the ray reaches a plane across `axis`; it does, since it moves along the axis.
-        let reaches = move |axis: usize, plane: f64| (plane - self.origin[axis]) / self.direction[axis];
+    /// When the ray enters and leaves `region`, where it does; cell `c` reaches from `c·size` to `(c + 1)·size`.
+    pub(super) fn span(&self, region: Region, size: i64) -> Option<(f64, f64)> {
         let (mut start, mut end) = (0.0f64, self.max_distance);
         for axis in 0..3 {
-            let [low, high] = [plane(region.min[axis], 0), plane(region.max[axis], 0)];
+            let [low, high] = [plane(region.min[axis], 0, size), plane(region.max[axis], 0, size)];
             if self.direction[axis] != 0.0 {
-                let [a, b] = [reaches(axis, low), reaches(axis, high)];
+                let [a, b] = [self.reaches(axis, low), self.reaches(axis, high)];
                 (start, end) = (start.max(a.min(b)), end.min(a.max(b)));
             } else if !(low..=high).contains(&self.origin[axis]) {
-                end = -1.0;
+                return None;
             }
         }
-        let mut next = (start <= end && !region.is_empty()).then(|| {
+        (start <= end && !region.is_empty()).then_some((start, end))
+    }
+
+    /// When the ray, which moves along `axis`, reaches a plane across it.
+    fn reaches(&self, axis: usize, plane: f64) -> f64 {
+        (plane - self.origin[axis]) / self.direction[axis]
+    }
+
+    /// The cells of `region` that the ray passes, in order.
+    pub(super) fn walk(&self, region: Region, size: i64) -> impl Iterator<Item = [i32; 3]> {
+        let span = self.span(region, size);
+        let end = span.map_or(0.0, |(_, end)| end);
+        let mut next = span.map(|(start, _)| {
             let entry = self.at(start);
             [0, 1, 2].map(|axis| {
                 let cell = libm::floor(entry[axis] / size as f64);
@@ -53,7 +62,7 @@ impl Ray {
             let cell = next?;
             let exits = [0, 1, 2].map(|axis| match self.direction[axis] {
                 0.0 => f64::INFINITY,
-                direction => reaches(axis, plane(cell[axis], (direction > 0.0).into())),
+                direction => self.reaches(axis, plane(cell[axis], (direction > 0.0).into(), size)),
             });
             let axis = (0..3).fold(0, |first, axis| if exits[axis] < exits[first] { axis } else { first });
             let mut following = cell;
@@ -113,4 +122,9 @@ fn normal(triangle: [[f32; 3]; 3]) -> [f32; 3] {
 fn unit(v: [f64; 3]) -> [f64; 3] {
     let length = sqrt_f64(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     v.map(|v| v / length)
+}
+
+/// The plane on the low (0) or high (1) side of a cell.
+fn plane(cell: i32, side: i64, size: i64) -> f64 {
+    ((i64::from(cell) + side) * size) as f64
 }

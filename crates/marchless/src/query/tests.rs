@@ -225,3 +225,38 @@ fn what_is_no_ray_hits_nothing() {
     assert_eq!(weight_at(&grid, [0.0, f64::INFINITY, 0.0]), None);
     assert_eq!(weight_at(&grid, [f64::MAX; 3]), Some(i16::OUTSIDE.to_voxels()));
 }
+
+#[test]
+fn chunks_far_apart_are_not_walked_between() {
+    let mut grid = Grid::<i16>::new(8).unwrap();
+    let far = [(1 << 27) - 100, -1000, 7];
+    let ball = |center: [i32; 3], material| {
+        let center = center.map(|v| f64::from(v) * 8.0);
+        Stamp::new(BrushShape::sphere(center, 6.0).unwrap(), Operation::Add, material)
+    };
+    grid.apply(&ball([0, 0, 0], 1));
+    grid.apply(&ball(far, 2));
+    let [x, y, z] = far.map(|v| f64::from(v) * 8.0);
+    let cast = |origin, direction| ray_cast(&grid, 0.0, origin, direction, f64::INFINITY);
+    let hit = cast([0.4, 0.3, 50.0], [0.0, 0.0, -1.0]).expect("the ball at the origin is in the way");
+    assert_eq!((hit.material, hit.chunk), (1, [0, 0, 0]));
+    let hit = cast([x + 0.4, y + 0.3, z - 50.0], [0.0, 0.0, 1.0]).expect("the far ball is in the way");
+    assert!(hit.material == 2 && (hit.distance - 44.0).abs() < 0.2, "{hit:?}");
+    // From the one to the other: the nearer one comes first, whichever it is.
+    assert_eq!(cast([50.0, 0.0, 0.0], [-x, -y, -z]).map(|hit| hit.material), Some(1));
+    assert_eq!(cast([100.0, 0.0, 0.0], [x - 100.0, y, z]).map(|hit| hit.material), Some(2));
+    assert_eq!(cast([-50.0, 0.0, 0.0], [x + 50.0, y, z]).map(|hit| hit.material), Some(1));
+}
+
+#[test]
+fn weights_are_finite_whatever_the_samples_are() {
+    let mut grid = Grid::<f32>::new(8).unwrap();
+    grid.set([0, 0, 0], Voxel::new(f32::NEG_INFINITY, 1)).unwrap();
+    grid.set([1, 0, 0], Voxel::new(f32::NAN, 1)).unwrap();
+    grid.set([0, 1, 0], Voxel::new(-2.0, 1)).unwrap();
+    assert_eq!(weight_at(&grid, [0.0, 1.0, 0.0]), Some(-2.0));
+    for position in [[0.0; 3], [0.5; 3], [1.0, 0.0, 0.0], [0.25, 0.0, 0.0]] {
+        assert!(weight_at(&grid, position).is_some_and(f32::is_finite), "at {position:?}");
+    }
+    assert!(weight_at(&grid, [0.0; 3]).is_some_and(|weight| weight < 0.0));
+}
