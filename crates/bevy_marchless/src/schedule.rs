@@ -51,7 +51,8 @@ pub struct MarchlessSettings {
     /// A group of at most so many chunks is meshed within the update that changed it; a larger one in tasks, to be
     /// shown updates later. Unit: chunks with a surface. Default 8: what a small stamp at a corner of chunks touches.
     pub inline_chunks: usize,
-    /// Without threads: how many chunks may be sampled or meshed per update, on the main thread. `None`: in tasks,
+    /// Without threads: how many chunks may be sampled or meshed per update, on the main thread; `Some(0)` lets them all
+    /// wait, and only what `inline_chunks` allows is meshed. `None`: in tasks,
     /// as many at once as the pool of asynchronous tasks has threads. Default: 8 on the web, `None` elsewhere; also 8 where there is no such pool.
     pub budget: Option<usize>,
 }

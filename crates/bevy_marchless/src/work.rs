@@ -10,6 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_ecs::prelude::*;
+use bevy_platform::sync::atomic::AtomicU64;
 use bevy_tasks::{AsyncComputeTaskPool, futures_lite::future::yield_now};
 
 use crate::schedule::MarchlessSettings;
@@ -140,17 +141,27 @@ pub(crate) fn start_work(queue: Res<WorkQueue>, settings: Res<MarchlessSettings>
         }
         (budget, _) => {
             for _ in 0..budget.unwrap_or(8) {
-                do_next(&queue);
+                if !do_next(&queue) {
+                    break;
+                }
             }
         }
     }
 }
 
-/// Does the most urgent job here and now.
-pub(crate) fn do_next(queue: &WorkQueue) {
-    if let Some(job) = queue.0.take() {
-        run(job);
-    }
+/// Does the most urgent job here and now; `false` where none waits.
+pub(crate) fn do_next(queue: &WorkQueue) -> bool {
+    let job = queue.0.take();
+    let found = job.is_some();
+    job.into_iter().for_each(run);
+    found
+}
+
+/// A number that no other work in this process has, above all before it: whose results are late can be told from it,
+/// whatever has become of the component that asked for them.
+pub(crate) fn new_number() -> u64 {
+    static LAST: AtomicU64 = AtomicU64::new(0);
+    LAST.fetch_add(1, Relaxed) + 1
 }
 
 /// Where jobs leave what they made.

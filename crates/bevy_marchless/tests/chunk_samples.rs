@@ -2,6 +2,8 @@
 
 mod common;
 
+use bevy_camera::primitives::Aabb;
+use bevy_camera::visibility::NoAutoAabb;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::{UVec3, Vec3};
@@ -77,4 +79,29 @@ fn bad_samples_are_refused_in_a_sentence() {
     samples.isovalue = f32::NAN;
     app.world_mut().spawn(samples);
     app.update();
+}
+
+#[test]
+fn a_late_mesh_of_removed_samples_is_not_shown() {
+    let mut app = app_with_budget(1);
+    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    let entity = app.world_mut().spawn(plane(9, 3.5)).id();
+    // The first job has run, but its mesh has not been shown.
+    app.update();
+    app.world_mut().entity_mut(entity).remove::<ChunkSamples>();
+    assert!(app.world().get::<Aabb>(entity).is_none() && app.world().get::<NoAutoAabb>(entity).is_none());
+    app.world_mut().entity_mut(entity).insert(plane(9, 5.5));
+    app.update();
+    assert_eq!(heights(&app, entity), vec![], "neither the former mesh nor the new one yet");
+    app.update();
+    assert_eq!(heights(&app, entity), vec![5.5; 81]);
+}
+
+#[test]
+fn any_number_of_inline_chunks_may_be_asked_for() {
+    let mut app = app();
+    app.insert_resource(MarchlessSettings { inline_chunks: usize::MAX, ..MarchlessSettings::default() });
+    let entity = app.world_mut().spawn(plane(9, 3.5)).id();
+    app.update();
+    assert_eq!(heights(&app, entity), vec![3.5; 81]);
 }

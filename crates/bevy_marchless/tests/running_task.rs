@@ -81,3 +81,33 @@ fn samples_of_a_former_source_are_dropped() {
     assert!(volume(&app, terrain).grid().get([5, 20, 5]).weight < 0);
     assert_drawn(&mut app, terrain);
 }
+
+#[test]
+fn samples_of_a_removed_terrain_are_dropped() {
+    for with_volume in [false, true] {
+        let mut app = app();
+        let gate = Gate::default();
+        let terrain = app.world_mut().spawn(gated_ground(&gate)).id();
+        update_until(&mut app, |_| gate.reached() == 1);
+        let mut entity = app.world_mut().entity_mut(terrain);
+        if with_volume {
+            entity.remove::<(Terrain, TerrainVolume)>();
+        } else {
+            entity.remove::<Terrain>();
+        }
+        // The first chunk stops at a gate again, so that the former one comes while the new one is waited for.
+        let second = Gate::default();
+        entity.insert(gated_ground(&second).with_chunk_cells(8));
+        app.update();
+        gate.open();
+        update_until(&mut app, |_| second.reached() == 1);
+        for _ in 0..50 {
+            app.update();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        assert!(volume(&app, terrain).grid().chunk([0; 3]).is_none(), "nobody has sampled it yet");
+        second.open();
+        settle(&mut app, terrain);
+        assert_drawn(&mut app, terrain);
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bevy_camera::primitives::Aabb;
 use bevy_camera::visibility::{NoAutoAabb, Visibility};
 use bevy_ecs::prelude::*;
 use bevy_math::UVec3;
@@ -16,11 +17,12 @@ use super::job::{Meshed, mesh_with};
 use crate::chunk::ChunkGeometry;
 use crate::schedule::MarchlessSettings;
 use crate::terrain::Palette;
-use crate::work::{Priority, Results, Ticket, WorkQueue};
+use crate::work::{Priority, Results, Ticket, WorkQueue, new_number};
 
 /// Samples of your own: insert them on any entity, and their mesh appears, and again after each change.
 ///
-/// The mesh is in voxels from the first sample; the entity's `Transform` is yours. It stays open where the surface
+/// The mesh is in voxels from the first sample; the entity's `Transform` is yours, and so is its material: without any it gets
+/// a plain one (feature `pbr`). It stays open where the surface
 /// meets the samples' border, and takes no stamps.
 ///
 /// ```
@@ -149,13 +151,13 @@ pub enum ChunkSamplesError {
 #[derive(Component, Debug, Default)]
 pub(super) struct MeshingState {
     changed: bool,
-    /// The job that meshes an earlier state; its result is shown, and the newest comes next.
-    job: Option<Ticket>,
+    /// The job that meshes an earlier state, and its number; its result is shown, and the newest comes next.
+    job: Option<(u64, Ticket)>,
 }
 
-/// What the jobs have meshed.
+/// What the jobs have meshed: whose mesh, the job's number, the mesh.
 #[derive(Resource, Default)]
-pub(super) struct HandmadeResults(Results<(Entity, Meshed)>);
+pub(super) struct HandmadeResults(Results<(Entity, u64, Meshed)>);
 
 /// Meshes changed samples: small ones at once, others in jobs, one at a time for each entity.
 pub(super) fn mesh_samples(
@@ -165,13 +167,16 @@ pub(super) fn mesh_samples(
     settings: Res<MarchlessSettings>,
     mut screen: Screen,
 ) {
-    for (entity, meshed) in results.0.take() {
-        if let Ok((_, samples, mut state)) = chunks.get_mut(entity) {
+    for (entity, number, meshed) in results.0.take() {
+        // Samples that were removed and inserted again want no mesh of the former ones.
+        if let Ok((_, samples, mut state)) = chunks.get_mut(entity)
+            && state.job.as_ref().is_some_and(|(asked_for, _)| *asked_for == number)
+        {
             state.job = None;
             show(entity, &samples, meshed, &mut screen);
         }
     }
-    let mut cells_left = settings.inline_chunks * 32 * 32 * 32;
+    let mut cells_left = settings.inline_chunks.saturating_mul(32 * 32 * 32);
     for (entity, samples, mut state) in &mut chunks {
         if samples.is_changed() {
             state.changed = true;
@@ -185,8 +190,9 @@ pub(super) fn mesh_samples(
             cells_left -= samples.weights().len();
             show(entity, &samples, job(), &mut screen);
         } else {
-            let results = results.0.clone();
-            state.job = Some(queue.push(Priority::Edit, move || results.push((entity, job()))));
+            let (number, results) = (new_number(), results.0.clone());
+            let ticket = queue.push(Priority::Edit, move || results.push((entity, number, job())));
+            state.job = Some((number, ticket));
         }
     }
 }
@@ -198,5 +204,5 @@ fn show(entity: Entity, samples: &ChunkSamples, meshed: Meshed, screen: &mut Scr
 
 /// Without samples there is nothing to draw.
 pub(super) fn forget_removed_samples(removed: On<Remove, ChunkSamples>, mut commands: Commands) {
-    commands.entity(removed.entity).try_remove::<(Mesh3d, ChunkGeometry, MeshingState)>();
+    commands.entity(removed.entity).try_remove::<(Mesh3d, ChunkGeometry, Aabb, NoAutoAabb, MeshingState)>();
 }

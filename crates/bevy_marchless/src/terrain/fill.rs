@@ -57,7 +57,7 @@ pub(crate) fn take_filled_chunks(results: Res<FillResults>, mut volumes: Query<&
             Chunk::AIR
         });
         let volume = &mut *volume;
-        let Some(state) = volume.chunks.get_mut(&position) else { continue };
+        let Some(state) = volume.chunks.get_mut(&position).filter(|state| !state.is_filled()) else { continue };
         state.fill = None;
         volume.grid.insert(position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
         apply_waiting_stamps(volume, position);

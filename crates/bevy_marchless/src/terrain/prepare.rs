@@ -11,7 +11,7 @@ use super::fill::{FillResults, fill_chunk};
 use super::volume::ChunkState;
 use super::{Terrain, TerrainError, TerrainVolume};
 use crate::chunk::{Chunk, chunk_transform, new_chunk};
-use crate::work::WorkQueue;
+use crate::work::{WorkQueue, new_number};
 
 /// Checks terrains that are new or whose settings changed, and does what the change asks for.
 pub(crate) fn prepare_terrains(
@@ -24,11 +24,11 @@ pub(crate) fn prepare_terrains(
     for (entity, terrain, mut volume, was_refused) in &mut terrains {
         if let Err(error) = terrain.check() {
             bevy_log::error!("terrain {entity}: {error}; its settings are not applied");
-            commands.entity(entity).insert(error);
+            commands.entity(entity).try_insert(error);
             continue;
         }
         if was_refused {
-            commands.entity(entity).remove::<TerrainError>();
+            commands.entity(entity).try_remove::<TerrainError>();
         }
         let before = volume.settings.replace(terrain.clone());
         volume.colors = Arc::new(terrain.palette.to_vertex_colors());
@@ -60,7 +60,7 @@ fn lay_out(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, comman
     let extent = extent_of(terrain);
     volume.forget_work();
     for old in core::mem::take(&mut volume.chunks).into_values().filter_map(|state| state.entity) {
-        commands.entity(old).despawn();
+        commands.entity(old).try_despawn();
     }
     for position in extent.points() {
         let chunk = commands.spawn(new_chunk(entity, position, terrain.chunk_cells, terrain.voxel_size)).id();
@@ -75,7 +75,7 @@ fn refill(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, queue: 
     let extent = extent_of(terrain);
     volume.forget_work();
     volume.grid = empty_grid(terrain);
-    volume.filling += 1;
+    volume.filling = new_number();
     volume.unfilled = volume.chunks.len();
     for (&position, state) in &mut volume.chunks {
         let ticket = fill_chunk(entity, terrain, volume.filling, position, queue, results);

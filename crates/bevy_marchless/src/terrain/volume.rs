@@ -11,12 +11,12 @@ use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, Region, Stamp};
 use super::Terrain;
 use crate::mesh::{Colors, Meshed};
 use crate::stats::Since;
-use crate::work::Ticket;
+use crate::work::{Ticket, new_number};
 
 /// A terrain's samples. The plugin fills and changes them; read them here, change them with
 /// [`Stamp`](crate::brush::Stamp) messages.
 #[derive(Component, Reflect)]
-#[reflect(Component, from_reflect = false)]
+#[reflect(Component, Default, from_reflect = false)]
 pub struct TerrainVolume {
     /// The newest samples.
     #[reflect(ignore)]
@@ -25,11 +25,13 @@ pub struct TerrainVolume {
     #[reflect(ignore)]
     pub(crate) shown: Grid<i16>,
     /// The isovalue as drawn.
+    #[reflect(ignore)]
     pub(crate) shown_isovalue: f32,
     /// Every chunk of the extent.
     #[reflect(ignore)]
     pub(crate) chunks: BTreeMap<[i32; 3], ChunkState>,
     /// The settings in effect.
+    #[reflect(ignore)]
     pub(crate) settings: Option<Terrain>,
     /// The colours of the settings' palette.
     #[reflect(ignore)]
@@ -37,9 +39,11 @@ pub struct TerrainVolume {
     /// What stamps have changed in this update.
     #[reflect(ignore)]
     pub(crate) edit: Edit,
-    /// Counts fillings, so that a chunk sampled for an earlier one is recognised.
+    /// Which filling it is, so that a chunk sampled for an earlier one is recognised; 0 before the first.
+    #[reflect(ignore)]
     pub(crate) filling: u64,
     /// How many chunks wait for their samples.
+    #[reflect(ignore)]
     pub(crate) unfilled: usize,
     /// Chunks whose surroundings are filled, but which have not been meshed since.
     #[reflect(ignore)]
@@ -53,8 +57,6 @@ pub struct TerrainVolume {
     /// Which group works on a chunk. No chunk is in two groups, so results can never be shown out of order.
     #[reflect(ignore)]
     pub(crate) claims: BTreeMap<[i32; 3], u64>,
-    /// Numbers groups; never starts over, so that the results of forgotten groups find no other.
-    pub(crate) last_group: u64,
 }
 
 /// One chunk of a volume.
@@ -114,7 +116,6 @@ impl Default for TerrainVolume {
             pending: Vec::new(),
             groups: BTreeMap::new(),
             claims: BTreeMap::new(),
-            last_group: 0,
         }
     }
 }
@@ -208,9 +209,9 @@ impl TerrainVolume {
 
     /// Claims chunks for a new group, and gives it a number.
     pub(crate) fn claim(&mut self, chunks: &BTreeSet<[i32; 3]>) -> u64 {
-        self.last_group += 1;
-        self.claims.extend(chunks.iter().map(|position| (*position, self.last_group)));
-        self.last_group
+        let number = new_number();
+        self.claims.extend(chunks.iter().map(|position| (*position, number)));
+        number
     }
 
     /// Takes out a group, and frees the chunks that it claims.
@@ -288,7 +289,8 @@ mod tests {
         let mut volume = volume_with_group(true, &queue);
         do_next(&queue);
         assert!(!volume.free_for_edit(&edited), "it has begun");
-        assert!(volume.take_group(1).is_some());
+        let [id] = volume.groups.keys().copied().collect::<Vec<_>>()[..] else { panic!("one group") };
+        assert!(volume.take_group(id).is_some());
         assert!(volume.free_for_edit(&edited));
     }
 
