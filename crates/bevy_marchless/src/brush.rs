@@ -34,7 +34,7 @@ use crate::stats::count_update;
 /// }
 /// ```
 #[derive(Message, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Debug, PartialEq, Clone)]
+#[reflect(Message, Debug, PartialEq, Clone)]
 pub struct Stamp {
     /// The terrain's entity.
     pub terrain: Entity,
@@ -185,7 +185,7 @@ impl Stroke {
 ///
 /// Stamps on chunks that are still being filled are reported when they take effect.
 #[derive(Message, Reflect, Clone, Debug, PartialEq, Eq)]
-#[reflect(Debug, PartialEq, Clone)]
+#[reflect(Message, Debug, PartialEq, Clone)]
 pub struct TerrainEdited {
     /// The terrain's entity.
     pub terrain: Entity,
@@ -209,7 +209,6 @@ impl Plugin for BrushPlugin {
             .add_message::<TerrainEdited>()
             .register_type::<Stamp>()
             .register_type::<TerrainEdited>()
-            .register_type::<crate::query::TerrainHit>()
             .init_resource::<apply::StampQueue>()
             .add_systems(PostUpdate, apply::read_stamps.after(count_update).in_set(MarchlessSystems::ReadStamps))
             .add_systems(PostUpdate, (apply::apply_stamps, apply::report_edits).chain().in_set(MarchlessSystems::Edit));

@@ -2,9 +2,10 @@
 
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
-use bevy_math::{DVec3, Ray3d, Vec3};
+use bevy_math::{DVec3, IVec3, Ray3d, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::GlobalTransform;
+use marchless::Region;
 
 use crate::terrain::TerrainVolume;
 
@@ -63,12 +64,16 @@ impl TerrainQuery<'_, '_> {
 
     /// The weight at a position in world space, in voxels, negative inside, with all edits; interpolated between samples.
     ///
-    /// `None` where there is no such terrain, or the chunk there is not filled yet. Outside of the terrain's extent is air.
+    /// `None` where there is no such terrain, or a chunk with samples around it is not filled yet. Outside of the terrain's extent is air.
     pub fn weight_at(&self, terrain: Entity, position: Vec3) -> Option<f32> {
         let (_, volume, _) = self.terrains.get(terrain).ok()?;
         let lattice = self.to_lattice(terrain, position)?;
-        let chunk = volume.grid.chunk_of(lattice.floor().as_ivec3().to_array());
-        if volume.chunks.get(&chunk).is_some_and(|state| !state.is_filled()) {
+        // The samples between which it lies may be in up to eight chunks.
+        let corner = lattice.floor().as_ivec3();
+        let ends = [corner, corner.saturating_add(IVec3::ONE)];
+        let [low, high] = ends.map(|end| volume.grid.chunk_of(end.to_array()));
+        let unfilled = |chunk| volume.chunks.get(&chunk).is_some_and(|state| !state.is_filled());
+        if Region::new(low, high.map(|v| v + 1)).points().any(unfilled) {
             return None;
         }
         marchless::weight_at(&volume.grid, lattice.as_dvec3().to_array())

@@ -60,7 +60,8 @@ impl Source for Air {
 }
 
 /// Why settings do not make a source.
-#[derive(Clone, Debug, PartialEq, Error)]
+#[derive(Clone, Debug, PartialEq, Error, Reflect)]
+#[reflect(Debug, PartialEq, Clone)]
 #[non_exhaustive]
 pub enum SourceError {
     /// A number is not finite or out of its range.
@@ -124,7 +125,7 @@ pub(crate) fn rows<'a>(
 
 /// Registers the sources and their settings for reflection.
 pub(crate) fn register_types(app: &mut App) {
-    app.register_type::<Air>().register_type::<Sdf>();
+    app.register_type::<Air>().register_type::<Sdf>().register_type::<SourceError>();
     #[cfg(any(feature = "noise", feature = "png"))]
     app.register_type::<Stratum>();
     #[cfg(feature = "noise")]

@@ -60,7 +60,8 @@ pub struct Terrain {
     pub voxel_size: f32,
     /// The surface lies where the weight equals this many voxels; finite. Default 0.
     ///
-    /// Edits leave weights between −4 and 4 voxels, so isovalues beyond show none of them.
+    /// Edits leave weights between −4 and 4 voxels, so isovalues beyond show none of them. Sources skip chunks more than
+    /// 4 voxels from their surface, so isovalues beyond about ±3 may show seams there.
     pub isovalue: f32,
     /// Whether meshes have normals. Default true.
     pub normals: bool,
@@ -306,6 +307,7 @@ impl Plugin for TerrainPlugin {
         crate::source::register_types(app);
         app.register_type::<Terrain>()
             .register_type::<TerrainVolume>()
+            .register_type::<crate::query::TerrainHit>()
             .register_type::<TerrainError>()
             .register_type::<Chunk>()
             .register_type::<ChunkGeometry>()

@@ -98,3 +98,25 @@ fn bad_rays_and_bad_transforms_hit_nothing() {
     assert!(cast(&mut app, Vec3::splat(50.0), Vec3::splat(16.0), 1000.0).is_none());
     assert!(cast(&mut app, Vec3::splat(50.0), Vec3::splat(16.0), f32::NAN).is_none());
 }
+
+#[test]
+fn a_weight_beside_a_chunk_that_is_not_filled_is_unknown() {
+    let mut app = app_with_budget(1);
+    let terrain = app.world_mut().spawn(ground()).id();
+    let filled = |app: &App| {
+        let grid = volume(app, terrain).grid();
+        grid.bounds().map_or(0, |chunks| chunks.points().filter(|position| grid.chunk(*position).is_some()).count())
+    };
+    update_until(&mut app, |app| filled(app) == 1);
+    let grid = volume(&app, terrain).grid();
+    let first = grid.bounds().unwrap().points().find(|position| grid.chunk(*position).is_some()).unwrap();
+    let corner = Vec3::from(first.map(|v| v as f32)) * 16.0;
+    assert_eq!(first[0], 0, "it has a neighbour along x");
+    // In its midst, and half a voxel before that neighbour.
+    let (within, beside) = (corner + 1.5, corner + Vec3::new(15.5, 1.5, 1.5));
+    let weights = app.world_mut().run_system_once(move |terrains: TerrainQuery| {
+        [within, beside].map(|position| terrains.weight_at(terrain, position))
+    });
+    let [within, beside] = weights.unwrap();
+    assert!(within.is_some() && beside.is_none());
+}

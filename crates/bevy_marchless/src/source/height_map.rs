@@ -106,11 +106,22 @@ impl HeightMap {
         let (Some(&lowest), Some(&highest)) = (samples.iter().min(), samples.iter().max()) else {
             return Err(HeightMapError::Empty { size });
         };
+        let floor = 0.0;
+        Self { size, samples: samples.into(), settings: HeightMapSettings::default(), lowest, highest, floor }
+            .with_settings(settings)
+            .map_err(HeightMapError::from)
+    }
+
+    /// The same samples as another ground; they are shared, not copied.
+    ///
+    /// # Errors
+    /// [`SourceError`] for settings that are out of range.
+    pub fn with_settings(self, settings: HeightMapSettings) -> Result<Self, SourceError> {
         check_length("metres per pixel along x", settings.metres_per_pixel.x)?;
         check_length("metres per pixel along z", settings.metres_per_pixel.y)?;
         check_length("metres per unit", settings.metres_per_unit)?;
         check_length("exaggeration", settings.exaggeration)?;
-        let mut map = Self { size, samples: samples.into(), settings, lowest, highest, floor: 0.0 };
+        let mut map = Self { settings, floor: 0.0, ..self };
         check_length("the map's longer side", map.size_in_world().max_element())?;
         check_position("the highest point above the lowest one", map.max_height())?;
         map.floor = check_position("the floor", map.settings.floor.unwrap_or(8.0 * map.default_voxel_size()))?;
