@@ -38,7 +38,7 @@ pub fn picture_plugins() -> PluginGroupBuilder {
 ///
 /// The picture is taken some frames after [`PictureReady`] becomes true; until then nothing is rendered.
 pub struct PicturePlugin {
-    /// Where to write it; the name's ending says which format.
+    /// Where to write it, in the PNG format.
     pub path: PathBuf,
     /// Width and height. [Units: pixels]
     pub size: UVec2,
@@ -95,6 +95,18 @@ fn save_and_exit(captured: On<ScreenshotCaptured>, picture: Res<Picture>, mut ex
             AppExit::error()
         }
     });
+}
+
+/// Says what is wrong with the name of a picture file, if anything is.
+///
+/// # Errors
+/// A sentence, where the name does not end in .png.
+pub fn check_picture_name(path: &Path) -> Result<(), String> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        Ok(())
+    } else {
+        Err(format!("the picture's name must end in .png, but it is {}", path.display()))
+    }
 }
 
 fn save(image: &Image, path: &Path) -> Result<(), Box<dyn Error>> {

@@ -9,13 +9,13 @@ use clap::Parser;
 
 use crate::camera::FlyCameraPlugin;
 use crate::graphics;
-use crate::picture::{PicturePlugin, PictureReady, picture_plugins, window_plugins};
+use crate::picture::{PicturePlugin, PictureReady, check_picture_name, picture_plugins, window_plugins};
 
 #[derive(Parser)]
 #[command(about = None)]
 struct Arguments {
     /// Renders one picture to this PNG file, without a window, and exits
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(long, value_name = "FILE.png", value_parser = picture_name)]
     screenshot: Option<PathBuf>,
 }
 
@@ -51,6 +51,12 @@ pub fn sun(direction: Vec3) -> impl Bundle {
         CascadeShadowConfigBuilder { maximum_distance: 600.0, first_cascade_far_bound: 150.0, ..default() }.build(),
         Transform::default().looking_to(direction, Vec3::Y),
     )
+}
+
+fn picture_name(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    check_picture_name(&path)?;
+    Ok(path)
 }
 
 fn wait_for_terrains(terrains: Query<&TerrainVolume>, mut ready: ResMut<PictureReady>) {

@@ -38,12 +38,14 @@ fn bad_numbers_are_refused() {
         }
     }
     for size in ["0,100", "100", "9000,100", "1e2,1e2"] {
-        assert_refused(&["--size", size], "whole numbers from 16 to 8192");
+        assert_refused(&["--screenshot", "a.png", "--size", size], "whole numbers from 16 to 8192");
     }
     for place in ["0.5", "2,0", "0.5,0.5,NaN", "0.5,0.5,1000", "0.5,NaN"] {
         assert_refused(&["--screenshot", "a.png", "--dig", place], "two numbers from 0 to 1");
     }
     assert_refused(&["--heightmap", "map.png"], "--metres-per-pixel");
+    assert_refused(&["--exaggerate", "2"], "--heightmap");
+    assert_refused(&["--size", "640,360"], "--screenshot");
 }
 
 #[test]
@@ -78,7 +80,7 @@ fn bad_height_maps_are_refused() {
         ("color.png", "16-bit grey"),
         ("cut.png", "cut short"),
         ("text.png", "PNG"),
-        ("empty.png", ""),
+        ("empty.png", "PNG"),
         ("missing.png", "missing.png"),
     ] {
         assert_refused(&[&["--headless", "--heightmap", file], &scale[..]].concat(), because);

@@ -6,6 +6,7 @@ use bevy::math::DVec2;
 use bevy::prelude::*;
 use clap::Parser;
 use marchless_examples::look::LOOKS;
+use marchless_examples::picture::check_picture_name;
 
 /// A landscape to dig.
 #[derive(Parser, Debug)]
@@ -36,7 +37,7 @@ pub(crate) struct Args {
     pub(crate) voxel_size: Option<f64>,
 
     /// How many times too high the height map is drawn.
-    #[arg(long, value_name = "F", value_parser = positive, default_value_t = 1.0)]
+    #[arg(long, value_name = "F", value_parser = positive, default_value_t = 1.0, requires = "heightmap")]
     pub(crate) exaggerate: f64,
 
     /// Render a picture without a window, and exit.
@@ -44,7 +45,7 @@ pub(crate) struct Args {
     pub(crate) screenshot: Option<PathBuf>,
 
     /// The picture's width and height in pixels.
-    #[arg(long, value_name = "W,H", value_parser = picture_size, default_value = "1280,720")]
+    #[arg(long, value_name = "W,H", value_parser = picture_size, default_value = "1280,720", requires = "screenshot")]
     pub(crate) size: UVec2,
 
     /// Before the picture is taken, dig a ball where it shows this place (0,0 is its upper left corner, 1,1 the lower
@@ -79,11 +80,7 @@ impl Args {
         check_file(&self.out)?;
         let Some(picture) = &self.screenshot else { return Ok(()) };
         check_file(picture)?;
-        if picture.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
-            Ok(())
-        } else {
-            Err(format!("the picture's name must end in .png, but it is {}", picture.display()))
-        }
+        check_picture_name(picture)
     }
 }
 

@@ -10,10 +10,12 @@ use bevy_marchless::marchless::MeshReport;
 use bevy_marchless::prelude::*;
 
 use crate::glb::{self, Mesh};
-use crate::world::World;
+use crate::world::{Kind, World};
 
 /// How long a step may take before something must be wrong.
 const PATIENCE: Duration = Duration::from_secs(1800);
+/// How far one stamp of the tunnel reaches along an axis at most. [Units: voxels]
+const LONGEST_PIECE: f32 = 2000.0;
 
 /// Builds the world, digs a tunnel through it, checks the mesh, writes it to `out` and prints counts and times.
 ///
@@ -44,8 +46,11 @@ fn try_run(world: &World, out: &Path) -> Result<(), Box<dyn core::error::Error>>
     report(&collect(&mut app, &terrain));
 
     let start = Instant::now();
-    app.world_mut().write_message(tunnel(entity, world, size.as_vec3()));
+    app.world_mut().write_message_batch(tunnel(entity, world, size.as_vec3()));
     let removed = settle(&mut app, entity)?;
+    if removed == 0 && world.kind != Kind::Air {
+        return Err("the tunnel has met no ground".into());
+    }
     let time = start.elapsed();
     println!("Dug a tunnel of {removed} cubic voxels in {}.", milliseconds(time));
     let mesh = collect(&mut app, &terrain);
@@ -60,11 +65,15 @@ fn try_run(world: &World, out: &Path) -> Result<(), Box<dyn core::error::Error>>
     Ok(())
 }
 
-/// From wall to wall along x, just below the middle of the ground's relief, a little downhill.
-fn tunnel(terrain: Entity, world: &World, size: Vec3) -> Stamp {
+/// From wall to wall along x, just below the middle of the ground's relief, a little downhill. A long tunnel takes several
+/// stamps, each within the length that brushes may have.
+fn tunnel(terrain: Entity, world: &World, size: Vec3) -> Vec<Stamp> {
     let [low, high] = world.relief();
     let end = |x: f32, share: f32| Vec3::new(x, low + share * (high - low), 0.5 * size.z);
-    Stamp::dig(terrain, BrushShape::capsule(end(-8.0, 0.35), end(size.x + 8.0, 0.15), 7.0))
+    let (start, end) = (end(-8.0, 0.35), end(size.x + 8.0, 0.15));
+    let pieces = ((end - start).abs().max_element() / LONGEST_PIECE).ceil().max(1.0) as u32;
+    let joint = |piece: u32| start.lerp(end, piece as f32 / pieces as f32);
+    (0..pieces).map(|piece| Stamp::dig(terrain, BrushShape::capsule(joint(piece), joint(piece + 1), 7.0))).collect()
 }
 
 /// Updates until all is as it is drawn; returns how many cubic voxels were removed meanwhile.

@@ -101,7 +101,11 @@ impl Panel<'_> {
         });
         ui.horizontal(|ui| {
             ui.checkbox(&mut self.bounds.0, "chunk bounds");
-            ui.checkbox(&mut self.wireframe.global, "wireframe");
+            // Not touched where it stays as it is, so that nothing is drawn anew for its sake.
+            let mut wireframe = self.wireframe.global;
+            if ui.checkbox(&mut wireframe, "wireframe").changed() {
+                self.wireframe.global = wireframe;
+            }
         });
     }
 

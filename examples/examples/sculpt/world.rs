@@ -171,7 +171,7 @@ impl Map {
         let source = HeightMap::from_path(path, settings.clone())?;
         let voxel_size = args.voxel_size.unwrap_or(source.default_voxel_size());
         let floor = Some(40.0 * voxel_size);
-        let source = HeightMap::from_path(path, HeightMapSettings { strata: strata(voxel_size), floor, ..settings })?;
+        let source = source.with_settings(HeightMapSettings { strata: strata(voxel_size), floor, ..settings })?;
         let extent = source.extent_in_chunks(voxel_size, marchless::DEFAULT_CHUNK_CELLS)?;
         if args.voxel_size.is_none() {
             println!("A voxel is {voxel_size:.1} m large, so that the longer side is 512 voxels.");
