@@ -10,6 +10,7 @@ use bevy_ecs::resource::IsResource;
 use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
 
 use crate::chunk::Chunk;
+use crate::mesh::ChunkSamples;
 use crate::schedule::MarchlessSystems;
 use crate::terrain::Terrain;
 
@@ -39,13 +40,15 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     }
 }
 
-/// Draws terrains with [`StandardMaterial`]: their own, or a plain one where they have none.
+/// Draws terrains and hand-made [`ChunkSamples`] with [`StandardMaterial`]: their own, or a plain one where they have none.
+/// That they have another is known where there is a [`TerrainMaterialPlugin`] for its type.
 #[derive(Default)]
 pub struct MaterialPlugin;
 
 impl Plugin for MaterialPlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins(TerrainMaterialPlugin::<StandardMaterial>::default())
+            .add_observer(take_away_plain_material)
             .add_systems(PostUpdate, give_default_material.in_set(MarchlessSystems::Prepare));
     }
 }
@@ -54,30 +57,41 @@ impl Plugin for MaterialPlugin {
 #[derive(Resource, Default)]
 struct MaterialTypes(Vec<ComponentId>);
 
-/// On terrains that have been given the plain material.
+/// On terrains and hand-made chunks that have been given the plain material.
 #[derive(Component)]
 struct PlainMaterial;
 
-/// Gives terrains without any material a plain one, which shows the palette's colours, and takes it away when they get
-/// another.
+/// Gives terrains and hand-made chunks without any material a plain one, which shows the palette's colours, and takes it
+/// away when they get another.
 fn give_default_material(
     // Resources are components too; without them, `assets` may be changed meanwhile.
-    terrains: Query<EntityRef, (With<Terrain>, Without<IsResource>)>,
+    drawn: Query<EntityRef, (Or<(With<Terrain>, With<ChunkSamples>)>, Without<IsResource>)>,
     types: Res<MaterialTypes>,
     assets: Option<ResMut<Assets<StandardMaterial>>>,
     mut plain: Local<Option<Handle<StandardMaterial>>>,
     mut commands: Commands,
 ) {
     let Some(mut assets) = assets else { return };
-    for terrain in &terrains {
-        let materials = types.0.iter().filter(|component| terrain.contains_id(**component)).count();
-        let mut entity = commands.entity(terrain.id());
+    for found in &drawn {
+        let materials = types.0.iter().filter(|component| found.contains_id(**component)).count();
+        let mut entity = commands.entity(found.id());
         if materials == 0 {
             let make = || assets.add(StandardMaterial { perceptual_roughness: 0.9, ..StandardMaterial::default() });
-            entity.insert((MeshMaterial3d(plain.get_or_insert_with(make).clone()), PlainMaterial));
-        } else if materials > 1 && terrain.contains::<PlainMaterial>() {
-            entity.remove::<(MeshMaterial3d<StandardMaterial>, PlainMaterial)>();
+            entity.try_insert((MeshMaterial3d(plain.get_or_insert_with(make).clone()), PlainMaterial));
+        } else if materials > 1 && found.contains::<PlainMaterial>() {
+            entity.try_remove::<(MeshMaterial3d<StandardMaterial>, PlainMaterial)>();
         }
+    }
+}
+
+/// Without its samples an entity that was a hand-made chunk has no use for the plain material.
+fn take_away_plain_material(
+    removed: On<Remove, ChunkSamples>,
+    plain: Query<(), (With<PlainMaterial>, Without<Terrain>)>,
+    mut commands: Commands,
+) {
+    if plain.contains(removed.entity) {
+        commands.entity(removed.entity).try_remove::<(MeshMaterial3d<StandardMaterial>, PlainMaterial)>();
     }
 }
 
@@ -91,7 +105,7 @@ fn hand_on_material<M: Material>(
         if let Ok(material) = terrains.get(chunk.terrain)
             && (chunk.is_added() || material.is_changed())
         {
-            commands.entity(entity).insert(MeshMaterial3d(material.0.clone()));
+            commands.entity(entity).try_insert(MeshMaterial3d(material.0.clone()));
         }
     }
 }

@@ -62,3 +62,17 @@ fn another_type_of_material_is_left_alone() {
     assert_eq!(materials::<Other>(&mut app).len(), 8);
     assert_eq!(materials::<StandardMaterial>(&mut app).len(), 0);
 }
+
+#[test]
+fn samples_by_hand_get_a_plain_material_as_long_as_they_have_no_other() {
+    let mut app = app_with_materials();
+    let samples = || ChunkSamples::from_distances(bevy_math::UVec3::splat(2), &[0.5; 8]).unwrap();
+    let plain = app.world_mut().spawn(samples()).id();
+    let own = app.world_mut().spawn((samples(), MeshMaterial3d::<Other>::default())).id();
+    app.update();
+    let has_plain = |app: &App, entity| app.world().get::<MeshMaterial3d<StandardMaterial>>(entity).is_some();
+    assert!(has_plain(&app, plain) && !has_plain(&app, own));
+    app.world_mut().entity_mut(plain).remove::<ChunkSamples>();
+    app.update();
+    assert!(!has_plain(&app, plain));
+}
