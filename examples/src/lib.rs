@@ -9,3 +9,8 @@ pub mod look;
 pub mod picture;
 pub mod sky;
 pub mod small;
+
+/// Compiles the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;
