@@ -1,0 +1,88 @@
+//! [`Error`]: why there is no mesh.
+
+use std::io;
+use std::path::PathBuf;
+
+use marchless::MeshError;
+use thiserror::Error;
+
+use crate::npy::NpyError;
+use crate::output::OutputError;
+use crate::sample::SampleType;
+
+/// Why there is no mesh, in one sentence. Whatever it is, no half-written file is left behind.
+#[derive(Debug, Error)]
+pub(crate) enum Error {
+    #[error("{} is both the input and the output; the mesh needs a file of its own", path.display())]
+    SameFile { path: PathBuf },
+
+    #[error("{} cannot be written, since its name does not end in .ply, .obj, .stl or .glb", path.display())]
+    OutputFormat { path: PathBuf },
+
+    #[error("{} cannot be written, since there is no folder {}", path.display(), folder.display())]
+    NoFolder { path: PathBuf, folder: PathBuf },
+
+    #[error("{} cannot be written, since it is there already and not a file", path.display())]
+    OutputNotAFile { path: PathBuf },
+
+    #[error("{} cannot be read, since its name does not end in .raw or .npy", path.display())]
+    InputFormat { path: PathBuf },
+
+    #[error("{} cannot be read: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
+
+    #[error("{} cannot be read, since it is not a file", path.display())]
+    InputNotAFile { path: PathBuf },
+
+    #[error("a .raw file says nothing of itself: {flag} is needed")]
+    FlagMissing { flag: &'static str },
+
+    #[error("{} cannot be read: {source}", path.display())]
+    Npy { path: PathBuf, source: NpyError },
+
+    #[error("{} has {} × {} × {} samples along x, y and z, but at least 2 along each are needed, and at most {}",
+        path.display(), size[0], size[1], size[2], u32::MAX)]
+    Size { path: PathBuf, size: [u64; 3] },
+
+    #[error("{} has {} × {} × {} samples along x, y and z, but --shape says {},{},{}",
+        path.display(), found[0], found[1], found[2], said[0], said[1], said[2])]
+    ShapeDisagrees { path: PathBuf, found: [u32; 3], said: [u32; 3] },
+
+    #[error("{} holds samples of type {found}, but --type says {said}", path.display())]
+    TypeDisagrees { path: PathBuf, found: SampleType, said: SampleType },
+
+    #[error("{} × {} × {} samples of type {sample_type} are more bytes than a file can have", size[0], size[1], size[2])]
+    TooLarge { size: [u32; 3], sample_type: SampleType },
+
+    #[error("{} should be {expected} bytes long ({header} of header and {} × {} × {} samples of type {sample_type}), but has {found}",
+        path.display(), size[0], size[1], size[2])]
+    Length { path: PathBuf, expected: u64, header: u64, size: [u32; 3], sample_type: SampleType, found: u64 },
+
+    #[error("a slab of {} × {} samples does not fit in memory", slab[0], slab[1])]
+    Memory { slab: [u32; 2] },
+
+    #[error(
+        "a spacing of {spacing} along an axis of {samples} samples gives positions that 32-bit numbers cannot tell apart or hold"
+    )]
+    Spacing { spacing: f64, samples: u32 },
+
+    #[error("{} cannot be meshed: {source}", path.display())]
+    Mesh { path: PathBuf, source: MeshError },
+
+    #[error("{} cannot be written: {source}", path.display())]
+    Write { path: PathBuf, source: OutputError },
+
+    #[error("interrupted; nothing has been written")]
+    Interrupted,
+}
+
+impl Error {
+    /// 2 for bad input, 1 where the system cannot take the mesh, 130 for an interruption.
+    pub(crate) const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted => 130,
+            Self::Memory { .. } | Self::Write { .. } => 1,
+            _ => 2,
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! [`Volume`]: a file of samples that is read a slab at a time.
+
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::PathBuf;
+
+use crate::args::{Args, extension};
+use crate::error::Error;
+use crate::npy::{Header, NpyError};
+use crate::sample::SampleType;
+
+/// A file of samples, opened where they begin.
+///
+/// What is said of its shape and what the file is long agree; so do its header and the command line.
+#[derive(Debug)]
+pub(crate) struct Volume {
+    path: PathBuf,
+    file: File,
+    pub(crate) sample_type: SampleType,
+    /// Samples along x, y and z; at least 2 each.
+    pub(crate) size: [u32; 3],
+    /// Whether neighbours along z, rather than x, are neighbours in the file. Then a slab is one of x.
+    ///
+    /// A NumPy array has the indices `[z][y][x]` whatever its order in memory, since NumPy hides that order from those who use it.
+    /// In C order, the last index is the fastest; in Fortran order the first is.
+    pub(crate) z_fastest: bool,
+}
+
+impl Volume {
+    /// Opens the input.
+    ///
+    /// # Errors
+    /// [`Error`] where it is not what its name and the flags say, or its length is not what follows from its shape.
+    pub(crate) fn open(args: &Args) -> Result<Self, Error> {
+        let path = || args.input.clone();
+        let extension = extension(&args.input);
+        if extension != "raw" && extension != "npy" {
+            return Err(Error::InputFormat { path: path() });
+        }
+        let read = |source| Error::Read { path: path(), source };
+        // Opening a pipe would wait for someone to write to it.
+        if !fs::metadata(&args.input).map_err(read)?.is_file() {
+            return Err(Error::InputNotAFile { path: path() });
+        }
+        let file = File::open(&args.input).map_err(read)?;
+        let mut volume = Self { path: path(), file, sample_type: SampleType::U8, size: [0; 3], z_fastest: false };
+        let header = if extension == "npy" { volume.read_header(args)? } else { volume.believe(args)? };
+
+        let (size, sample_type) = (volume.size, volume.sample_type);
+        let expected = size
+            .iter()
+            .try_fold(sample_type.bytes() as u64, |bytes, &samples| bytes.checked_mul(u64::from(samples)))
+            .and_then(|bytes| bytes.checked_add(header))
+            .ok_or(Error::TooLarge { size, sample_type })?;
+        let found = volume.file.metadata().map_err(read)?.len();
+        if found != expected {
+            return Err(Error::Length { path: path(), expected, header, size, sample_type, found });
+        }
+        Ok(volume)
+    }
+
+    /// Samples along the two faster axes of the file.
+    pub(crate) const fn slab(&self) -> [u32; 2] {
+        let [x, y, z] = self.size;
+        if self.z_fastest { [z, y] } else { [x, y] }
+    }
+
+    /// How many slabs there are.
+    pub(crate) const fn slabs(&self) -> u32 {
+        self.size[if self.z_fastest { 0 } else { 2 }]
+    }
+
+    /// Reads the next slab, which fills `bytes`.
+    ///
+    /// # Errors
+    /// [`Error::Read`], also where the file has become shorter.
+    pub(crate) fn read(&mut self, bytes: &mut [u8]) -> Result<(), Error> {
+        self.file.read_exact(bytes).map_err(|source| self.cannot_be_read(source))
+    }
+
+    pub(crate) fn error(&self, source: marchless::MeshError) -> Error {
+        Error::Mesh { path: self.path.clone(), source }
+    }
+
+    fn cannot_be_read(&self, source: io::Error) -> Error {
+        Error::Read { path: self.path.clone(), source }
+    }
+
+    /// Takes over what the flags say; returns how long the header is: not at all.
+    fn believe(&mut self, args: &Args) -> Result<u64, Error> {
+        self.size = args.shape.ok_or(Error::FlagMissing { flag: "--shape" })?;
+        self.sample_type = args.sample_type.ok_or(Error::FlagMissing { flag: "--type" })?;
+        Ok(0)
+    }
+
+    /// Takes over what the header says; returns how long it is.
+    fn read_header(&mut self, args: &Args) -> Result<u64, Error> {
+        let path = || args.input.clone();
+        let header = Header::read(&mut self.file).map_err(|error| match error {
+            NpyError::Io(source) => self.cannot_be_read(source),
+            source => Error::Npy { path: path(), source },
+        })?;
+        let [z, y, x] = header.shape;
+        let size = [x, y, z].map(|samples| u32::try_from(samples).ok().filter(|&samples| samples >= 2));
+        let [Some(x), Some(y), Some(z)] = size else {
+            return Err(Error::Size { path: path(), size: [x, y, z] });
+        };
+        let found = [x, y, z];
+        if let Some(said) = args.shape.filter(|&said| said != found) {
+            return Err(Error::ShapeDisagrees { path: path(), found, said });
+        }
+        if let Some(said) = args.sample_type.filter(|&said| said != header.sample_type) {
+            return Err(Error::TypeDisagrees { path: path(), found: header.sample_type, said });
+        }
+        (self.size, self.sample_type, self.z_fastest) = (found, header.sample_type, header.fortran_order);
+        Ok(header.length)
+    }
+}

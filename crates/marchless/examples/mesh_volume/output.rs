@@ -1,0 +1,103 @@
+//! [`Output`]: a mesh file that grows piece by piece and takes its place only when it is whole.
+//!
+//! In every format a header with counts comes first, then what is written per vertex, then what is written per triangle. The counts and where
+//! the triangles begin are known last: room is left for the header, and the triangles wait in a second file (see [`Draft`]).
+
+mod draft;
+mod glb;
+mod obj;
+mod ply;
+mod stl;
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use marchless::MeshBuffer;
+use thiserror::Error;
+
+use crate::Stop;
+use crate::args::extension;
+use crate::error::Error;
+use draft::Draft;
+
+/// The formats, by the ends of their files' names.
+pub(crate) const FORMATS: [&str; 4] = ["ply", "obj", "stl", "glb"];
+
+/// A mesh file in the making.
+pub(crate) struct Output {
+    path: PathBuf,
+    draft: Draft,
+    encoder: Box<dyn Encoder>,
+}
+
+impl Output {
+    /// Begins a file that is to be at `path`, in the format that its name says.
+    ///
+    /// # Errors
+    /// [`Error`] where there is no such format, or no file can be made in the folder.
+    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
+        let encoder: Box<dyn Encoder> = match &*extension(path) {
+            "ply" => Box::new(ply::Ply::default()),
+            "obj" => Box::new(obj::Obj),
+            "stl" => Box::new(stl::Stl::default()),
+            "glb" => Box::new(glb::Glb::default()),
+            _ => return Err(Error::OutputFormat { path: path.to_owned() }),
+        };
+        let draft = Draft::create(path, encoder.header_length())
+            .map_err(|source| Error::Write { path: path.to_owned(), source: source.into() })?;
+        Ok(Self { path: path.to_owned(), draft, encoder })
+    }
+
+    /// Adds a piece of the mesh, whose indices count all vertices since the first piece.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub(crate) fn append(&mut self, piece: &MeshBuffer) -> Result<(), Error> {
+        let (body, tail) = self.draft.parts();
+        self.encoder.encode(piece, body, tail).map_err(|source| Error::Write { path: self.path.clone(), source })
+    }
+
+    /// Completes the file and puts it in its place.
+    ///
+    /// # Errors
+    /// [`Error::Write`] or [`Error::Interrupted`].
+    pub(crate) fn finish(self, stop: &Stop) -> Result<(), Error> {
+        let Self { path, draft, encoder } = self;
+        let written = match encoder.header() {
+            Ok(header) => draft.finish(&path, &header, || stop.check().is_ok()).map_err(OutputError::from),
+            Err(error) => Err(error),
+        };
+        stop.check()?;
+        written.map_err(|source| Error::Write { path, source })
+    }
+}
+
+/// A format of mesh files.
+trait Encoder {
+    /// How long the header is.
+    fn header_length(&self) -> usize;
+
+    /// Writes a piece of the mesh: to `body` what follows the header, to `tail` what follows the whole body.
+    fn encode(&mut self, piece: &MeshBuffer, body: &mut dyn Write, tail: &mut dyn Write) -> Result<(), OutputError>;
+
+    /// The header for all pieces.
+    fn header(&self) -> Result<Vec<u8>, OutputError>;
+}
+
+/// Why a mesh is not written.
+#[derive(Debug, Error)]
+pub(crate) enum OutputError {
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    #[error("a .glb file has at most {} bytes, and this mesh needs more; a .ply file can take it", u32::MAX)]
+    GlbTooLong,
+    #[error("a .stl file has at most {} triangles, and this mesh has more; a .ply file can take it", u32::MAX)]
+    StlTooLong,
+    #[error("triangle {triangle} has a vertex that is not at hand")]
+    VertexMissing { triangle: u64 },
+}
+
+/// The numbers as little-endian bytes, one after the other.
+fn bytes<const N: usize>(numbers: [[f32; 3]; N]) -> [[[u8; 4]; 3]; N] {
+    numbers.map(|vector| vector.map(f32::to_le_bytes))
+}

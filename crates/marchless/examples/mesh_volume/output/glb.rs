@@ -1,0 +1,150 @@
+//! Binary glTF: one mesh of one primitive, its positions and normals side by side, then its indices.
+
+use std::io::Write;
+
+use gltf_json as json;
+use json::accessor::{ComponentType, GenericComponentType, Type};
+use json::buffer::{Stride, Target};
+use json::mesh::Semantic::{Normals, Positions};
+use json::validation::{Checked::Valid, USize64};
+use marchless::MeshBuffer;
+
+use super::{Encoder, OutputError, bytes};
+
+/// Before the JSON: the file's magic, version and length, and the chunk's length and kind.
+const BEFORE_JSON: usize = 20;
+/// Room for the JSON, which spaces fill up.
+const JSON: usize = 1536;
+/// After it: the length and kind of the chunk of vertices and indices.
+const AFTER_JSON: usize = 8;
+
+const VERTEX: u64 = 24;
+const TRIANGLE: u64 = 12;
+
+#[derive(Default)]
+pub(super) struct Glb {
+    vertices: u64,
+    triangles: u64,
+    /// The smallest box around all positions.
+    bounds: Option<[[f32; 3]; 2]>,
+}
+
+impl Encoder for Glb {
+    fn header_length(&self) -> usize {
+        BEFORE_JSON + JSON + AFTER_JSON
+    }
+
+    fn encode(&mut self, piece: &MeshBuffer, body: &mut dyn Write, tail: &mut dyn Write) -> Result<(), OutputError> {
+        self.vertices += piece.positions.len() as u64;
+        self.triangles += piece.triangle_count() as u64;
+        self.length()?;
+        for (&position, &normal) in piece.positions.iter().zip(&piece.normals) {
+            let [min, max] = self.bounds.get_or_insert([position; 2]);
+            for axis in 0..3 {
+                min[axis] = min[axis].min(position[axis]);
+                max[axis] = max[axis].max(position[axis]);
+            }
+            body.write_all(bytes([position, normal]).as_flattened().as_flattened())?;
+        }
+        for triangle in piece.triangles() {
+            tail.write_all(triangle.map(u32::to_le_bytes).as_flattened())?;
+        }
+        Ok(())
+    }
+
+    fn header(&self) -> Result<Vec<u8>, OutputError> {
+        let length = self.length()?;
+        let binary = length - self.header_length() as u32;
+        // glTF knows no empty arrays, and no chunk for them: then the JSON reaches to the end of the file.
+        let json = if binary == 0 { JSON + AFTER_JSON } else { JSON };
+        let mut header = [&b"glTF"[..], &2u32.to_le_bytes(), &length.to_le_bytes()].concat();
+        header.extend((json as u32).to_le_bytes());
+        header.extend(b"JSON");
+        header.extend(self.json()?);
+        header.resize(BEFORE_JSON + json, b' ');
+        if binary > 0 {
+            header.extend(binary.to_le_bytes());
+            header.extend(b"BIN\0");
+        }
+        Ok(header)
+    }
+}
+
+impl Glb {
+    /// How long the file is.
+    fn length(&self) -> Result<u32, OutputError> {
+        let length = self.header_length() as u64 + self.vertices * VERTEX + self.triangles * TRIANGLE;
+        u32::try_from(length).map_err(|_| OutputError::GlbTooLong)
+    }
+
+    /// The scene; empty where there is no surface.
+    fn json(&self) -> Result<Vec<u8>, OutputError> {
+        let mut root = json::Root::default();
+        let mut scene =
+            json::Scene { nodes: Vec::new(), name: None, extensions: None, extras: json::Extras::default() };
+        if let Some([min, max]) = self.bounds {
+            let (vertices, indices) = (self.vertices * VERTEX, self.triangles * TRIANGLE);
+            let buffer = root.push(json::Buffer {
+                byte_length: USize64(vertices + indices),
+                uri: None,
+                name: None,
+                extensions: None,
+                extras: json::Extras::default(),
+            });
+            let mut view = |start, length, stride, target| {
+                root.push(json::buffer::View {
+                    buffer,
+                    byte_length: USize64(length),
+                    byte_offset: Some(USize64(start)),
+                    byte_stride: stride,
+                    name: None,
+                    target: Some(Valid(target)),
+                    extensions: None,
+                    extras: json::Extras::default(),
+                })
+            };
+            let corners = view(0, vertices, Some(Stride(VERTEX as usize)), Target::ArrayBuffer);
+            let triangles = view(vertices, indices, None, Target::ElementArrayBuffer);
+            let mut accessor = |view, start, count, component, shape, bounds: Option<[[f32; 3]; 2]>| {
+                let [min, max] =
+                    bounds.map_or([None, None], |bounds| bounds.map(|corner| Some(corner.to_vec().into())));
+                root.push(json::Accessor {
+                    buffer_view: Some(view),
+                    byte_offset: Some(USize64(start)),
+                    count: USize64(count),
+                    component_type: Valid(GenericComponentType(component)),
+                    type_: Valid(shape),
+                    min,
+                    max,
+                    name: None,
+                    normalized: false,
+                    sparse: None,
+                    extensions: None,
+                    extras: json::Extras::default(),
+                })
+            };
+            let (float, vector) = (ComponentType::F32, Type::Vec3);
+            let positions = accessor(corners, 0, self.vertices, float, vector, Some([min, max]));
+            let normals = accessor(corners, 12, self.vertices, float, vector, None);
+            let indices = accessor(triangles, 0, 3 * self.triangles, ComponentType::U32, Type::Scalar, None);
+            let mesh = root.push(json::Mesh {
+                primitives: vec![json::mesh::Primitive {
+                    attributes: [(Valid(Positions), positions), (Valid(Normals), normals)].into(),
+                    indices: Some(indices),
+                    material: None,
+                    mode: Valid(json::mesh::Mode::Triangles),
+                    targets: None,
+                    extensions: None,
+                    extras: json::Extras::default(),
+                }],
+                weights: None,
+                name: None,
+                extensions: None,
+                extras: json::Extras::default(),
+            });
+            scene.nodes.push(root.push(json::Node { mesh: Some(mesh), ..json::Node::default() }));
+        }
+        root.scene = Some(root.push(scene));
+        json::serialize::to_vec(&root).map_err(|error| OutputError::Io(error.into()))
+    }
+}

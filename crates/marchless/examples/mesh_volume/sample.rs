@@ -1,0 +1,128 @@
+//! [`Sample`]: how the samples of a file become weights, with the isovalue moved along and no sample changing sides.
+
+use std::fmt;
+
+use clap::ValueEnum;
+use marchless::Weight;
+
+/// The type of the samples in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SampleType {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    F32,
+    F64,
+}
+
+impl SampleType {
+    pub(crate) const fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+impl fmt::Display for SampleType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::I8 => "i8",
+            Self::U8 => "u8",
+            Self::I16 => "i16",
+            Self::U16 => "u16",
+            Self::I32 => "i32",
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        })
+    }
+}
+
+/// A type of sample, and the weights that the mesher gets for it.
+///
+/// A weight lies below [`Sample::isovalue`] exactly where its sample lies below the isovalue in the file's own
+/// numbers; NaN lies below nothing.
+pub(crate) trait Sample {
+    type Weight: Weight;
+
+    /// The isovalue for the weights, in voxels; finite. `iso`: the one for the samples, finite.
+    fn isovalue(iso: f64) -> f32;
+
+    /// Appends the weights of little-endian samples.
+    fn decode(bytes: &[u8], iso: f64, weights: &mut Vec<Self::Weight>);
+}
+
+macro_rules! integer_sample {
+    ($type:ty, $weight:ty, $flip:literal) => {
+        impl Sample for $type {
+            type Weight = $weight;
+
+            fn isovalue(iso: f64) -> f32 {
+                integer_isovalue::<$weight>(iso, f64::from(<$type>::MIN), f64::from(<$type>::MAX))
+            }
+
+            fn decode(bytes: &[u8], _iso: f64, weights: &mut Vec<$weight>) {
+                let (samples, _) = bytes.as_chunks();
+                weights.extend(samples.iter().map(|&sample| (<$type>::from_le_bytes(sample) ^ $flip) as $weight));
+            }
+        }
+    };
+}
+
+integer_sample!(i8, i8, 0);
+integer_sample!(i16, i16, 0);
+// Flipping the highest bit takes half of the range away, and so keeps the order.
+integer_sample!(u8, i8, 0x80);
+integer_sample!(u16, i16, 0x8000);
+
+/// The isovalue of integer weights, in voxels, for samples from `least` to `most`, the lowest of which becomes the lowest weight.
+///
+/// A whole number lies below an isovalue exactly where it lies below the next whole number up. So the rounding to
+/// `f32` may move the isovalue, but not onto or over a whole number.
+fn integer_isovalue<W: Weight>(iso: f64, least: f64, most: f64) -> f32 {
+    // Beyond the range nothing changes any more: no sample lies below the least one, all lie below one more than the most.
+    let iso = iso.clamp(least, most + 1.0);
+    // 0 for signed samples, half of the range for unsigned ones.
+    let shift = least + (most - least + 1.0) / 2.0;
+    let ceiling = (iso.ceil() - shift) as f32;
+    // One above zero must survive the division.
+    let floor = if ceiling == 1.0 { 1e-30 } else { (ceiling - 1.0).next_up() };
+    ((iso - shift) as f32).clamp(floor, ceiling) / W::SCALE
+}
+
+macro_rules! real_sample {
+    ($type:ty) => {
+        impl Sample for $type {
+            type Weight = f32;
+
+            fn isovalue(_iso: f64) -> f32 {
+                0.0
+            }
+
+            fn decode(bytes: &[u8], iso: f64, weights: &mut Vec<f32>) {
+                let (samples, _) = bytes.as_chunks();
+                weights.extend(samples.iter().map(|&sample| above(f64::from(<$type>::from_le_bytes(sample)), iso)));
+            }
+        }
+    };
+}
+
+// An `i32` has more digits than an `f32`, but what is left of it near the isovalue has few.
+real_sample!(i32);
+real_sample!(f32);
+real_sample!(f64);
+
+/// How far the sample lies above the isovalue, rounded such that it is negative exactly where the sample lies below.
+/// (Differences that are too small for an `f32` all count as its smallest.)
+#[inline(always)]
+fn above(sample: f64, iso: f64) -> f32 {
+    const LEAST: f32 = f32::from_bits(1);
+    // Never zero for different numbers.
+    let difference = sample - iso;
+    let rounded = difference as f32;
+    if difference < 0.0 { rounded.min(-LEAST) } else { rounded }
+}

@@ -1,0 +1,69 @@
+//! [`Transform`]: from the mesher's lattice to the user's space.
+
+use marchless::MeshBuffer;
+
+use crate::args::Args;
+use crate::error::Error;
+use crate::input::Volume;
+
+/// From the lattice of the file, in the order of its memory, to positions in grid units times spacing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Transform {
+    /// Whether the file's fastest axis is z.
+    z_fastest: bool,
+    /// Whether normals point to smaller values.
+    invert: bool,
+    spacing: [f64; 3],
+}
+
+impl Transform {
+    /// # Errors
+    /// [`Error::Spacing`] where the far end of the volume lies beyond 32-bit numbers, or steps within a cell below
+    /// them.
+    pub(crate) fn new(args: &Args, volume: &Volume) -> Result<Self, Error> {
+        for (&spacing, &samples) in args.spacing.iter().zip(&volume.size) {
+            let far = f64::from(samples) * spacing;
+            // Crossings stay 1/1024 of an edge apart.
+            if far > f64::from(f32::MAX) || spacing / 1024.0 < f64::from(f32::MIN_POSITIVE) {
+                return Err(Error::Spacing { spacing, samples });
+            }
+        }
+        Ok(Self { z_fastest: volume.z_fastest, invert: args.invert, spacing: args.spacing })
+    }
+
+    /// Moves a piece of the mesh.
+    pub(crate) fn apply(&self, mesh: &mut MeshBuffer) {
+        for position in &mut mesh.positions {
+            let lattice = self.ordered(*position);
+            *position = [0, 1, 2].map(|axis| (f64::from(lattice[axis]) * self.spacing[axis]) as f32);
+        }
+        for normal in &mut mesh.normals {
+            *normal = self.normal(self.ordered(*normal));
+        }
+        // Exchanging two axes is a reflection, which turns triangles over as well.
+        if self.invert != self.z_fastest {
+            for triangle in mesh.indices.as_chunks_mut::<3>().0 {
+                triangle.swap(1, 2);
+            }
+        }
+    }
+
+    /// The vector in the order x, y, z.
+    fn ordered(&self, [a, b, c]: [f32; 3]) -> [f32; 3] {
+        if self.z_fastest { [c, b, a] } else { [a, b, c] }
+    }
+
+    /// A gradient is a difference per distance: along an axis of wider spacing it is smaller.
+    fn normal(&self, normal: [f32; 3]) -> [f32; 3] {
+        let normal = if self.invert { normal.map(|v| -v) } else { normal };
+        let [x, y, z] = self.spacing;
+        if x == y && y == z {
+            return normal;
+        }
+        // Relative to the smallest spacing, so that nothing overflows and the largest part of it stays.
+        let least = x.min(y).min(z);
+        let gradient = [0, 1, 2].map(|axis| f64::from(normal[axis]) * (least / self.spacing[axis]));
+        let length = gradient.iter().map(|v| v * v).sum::<f64>().sqrt();
+        gradient.map(|v| (v / length) as f32)
+    }
+}
