@@ -55,6 +55,8 @@
 #![deny(unsafe_code)]
 
 extern crate alloc;
+#[cfg(feature = "std")]
+extern crate std;
 
 mod brush;
 mod buffer;
@@ -66,6 +68,7 @@ mod math;
 mod mesher;
 mod query;
 mod sample;
+mod simd;
 mod source;
 mod validate;
 
@@ -79,5 +82,6 @@ pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 pub use mesher::{MeshError, MeshSettings, Mesher};
 pub use query::{RayHit, ray_cast, weight_at};
 pub use sample::{Voxel, Weight};
+pub use simd::Backend;
 pub use source::{Bound, Source, SourceRegion};
 pub use validate::MeshReport;

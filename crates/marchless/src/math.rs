@@ -1,8 +1,5 @@
 //! The square root, which `core` lacks. It is exact in IEEE 754, so that both versions give the same bits.
 
-#[cfg(feature = "std")]
-extern crate std;
-
 #[inline(always)]
 pub(crate) fn sqrt(value: f32) -> f32 {
     #[cfg(feature = "std")]

@@ -1,26 +1,26 @@
-//! [`Mesher`]: from samples to a triangle mesh in four passes over rows of sign bits.
+//! [`Mesher`]: from samples to a triangle mesh, slab by slab, by way of sign bits.
 //!
 //! ```text
-//! samples ──1 classify──▶ sign words ──2 crossings──▶ first vertex of each row, exact counts
-//!                             │                            │
-//!                             ├──────────3 vertices◀───────┤   one per crossing: position, normal, material
-//!                             └──────────4 triangles◀──────┘   one visit per active cell
+//! slab of samples ──1 classify──▶ sign words ─┬─2 vertices──▶ one per crossing: position, normal, material
+//!                                             └─3 triangles─▶ one visit per active cell between two slabs
 //! ```
 //!
-//! The signs of a row of samples along x are packed into 64-bit words. Which edges the surface crosses, and how many, are then
-//! `xor`s and population counts of neighbouring rows' words, and only the few active cells are ever looked at one by
-//! one. Vertices are ordered by row (y fastest, then z), within a row by the axis of their edge, then by x;
-//! triangles by cell, x fastest.
+//! The signs of a row of samples along x are packed into 64-bit words. Which edges the surface crosses are then `xor`s of neighbouring
+//! words, and only the few crossings and active cells are ever looked at one by one. All passes work on one slab of
+//! samples after the other, while it is in the cache; nothing but the signs of two slabs is kept between them.
+//!
+//! Vertices are numbered slab by slab: those on edges along z from the slab below, then those on edges along x and
+//! along y, each row by row. Triangles follow the cells, x fastest.
 //!
 //! The way vertices are found without a map is that of William Schroeder, Rob Maynard and Berk Geveci, "Flying Edges: A
-//! High-Performance Scalable Isocontouring Algorithm" (2015), with words of sign bits in the place of edge cases.
+//! High-Performance Scalable Isocontouring Algorithm" (2015), with words of sign bits in the place of edge cases, and counters
+//! that run through a whole slab in the place of offsets per row.
 
 mod classify;
-mod crossings;
+mod output;
+mod slabs;
 mod triangles;
 mod vertices;
-
-use alloc::vec::Vec;
 
 use thiserror::Error;
 
@@ -28,8 +28,9 @@ use crate::{
     buffer::MeshBuffer,
     lattice::{Samples, Shape},
     sample::Weight,
+    simd::{Backend, dispatch},
 };
-use crossings::Row;
+use slabs::{Lattice, Slabs, Volume};
 pub(crate) use vertices::crossing_fraction;
 
 /// How to mesh.
@@ -42,6 +43,12 @@ pub struct MeshSettings {
     pub isovalue: f32,
     /// Whether to compute normals; default true.
     pub normals: bool,
+}
+
+impl MeshSettings {
+    fn check(&self) -> Result<(), MeshError> {
+        if self.isovalue.is_finite() { Ok(()) } else { Err(MeshError::Isovalue { found: self.isovalue }) }
+    }
 }
 
 impl Default for MeshSettings {
@@ -78,17 +85,22 @@ impl Default for MeshSettings {
 /// assert!(mesh.triangle_count() > 500);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Mesher {
-    /// The signs of all meshed samples: `words` a row, rows in order of y, then z.
-    signs: Vec<u64>,
-    rows: Vec<Row>,
+    /// Found out at the first mesh.
+    backend: Option<Backend>,
+    slabs: Slabs,
 }
 
 impl Mesher {
-    /// A mesher that has allocated nothing yet.
+    /// A mesher that has allocated nothing yet, and will use the [fastest](Backend::fastest) backend.
     pub const fn new() -> Self {
-        Self { signs: Vec::new(), rows: Vec::new() }
+        Self { backend: None, slabs: Slabs::new() }
+    }
+
+    /// A mesher that uses `backend`; the portable one where it is not [available](Backend::is_available).
+    pub const fn with_backend(backend: Backend) -> Self {
+        Self { backend: Some(backend), slabs: Slabs::new() }
     }
 
     /// Meshes `samples` into `out`, whose former content is dropped. No surface is no error: `out` is then empty.
@@ -102,36 +114,22 @@ impl Mesher {
         settings: &MeshSettings,
         out: &mut MeshBuffer,
     ) -> Result<(), MeshError> {
-        let meshed = self.mesh_or_refuse(samples, settings, out);
-        if meshed != Ok(true) {
+        out.clear();
+        settings.check()?;
+        let lattice = Lattice::of(&samples)?;
+        let backend = *self.backend.get_or_insert_with(Backend::fastest);
+        let volume = Volume { samples, lattice, settings, slabs: &mut self.slabs, out };
+        let meshed = dispatch(backend, volume);
+        if meshed.is_err() {
             out.clear();
         }
-        meshed.map(|_| ())
+        meshed
     }
+}
 
-    /// Whether there is a surface; where there is none, `out` is left as it was. What it held is overwritten rather than
-    /// dropped first, so that a warm buffer is not filled with zeros again and again.
-    fn mesh_or_refuse<W: Weight>(
-        &mut self,
-        samples: Samples<'_, W>,
-        settings: &MeshSettings,
-        out: &mut MeshBuffer,
-    ) -> Result<bool, MeshError> {
-        if !settings.isovalue.is_finite() {
-            return Err(MeshError::Isovalue { found: settings.isovalue });
-        }
-        let layout = Layout::new(&samples)?;
-        classify::classify(&samples, &layout, W::threshold(settings.isovalue), &mut self.signs);
-        let vertex_count = crossings::count(&layout, &self.signs, &mut self.rows);
-        if vertex_count == 0 {
-            return Ok(false);
-        }
-        if u32::try_from(vertex_count).is_err() {
-            return Err(MeshError::TooManyVertices { found: vertex_count });
-        }
-        vertices::place(&samples, &layout, settings, &self.signs, &self.rows, vertex_count as usize, out);
-        triangles::join(&layout, &self.signs, &self.rows, &mut out.indices);
-        Ok(true)
+impl Default for Mesher {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -154,74 +152,9 @@ pub enum MeshError {
         least: u32,
     },
     /// The vertices would not fit `u32` indices.
-    #[error("the surface has {found} vertices, more than 32-bit indices can name")]
+    #[error("the surface has at least {found} vertices, more than 32-bit indices can name")]
     TooManyVertices {
-        /// How many there are.
+        /// How many there were when meshing stopped.
         found: u64,
     },
-}
-
-/// Where the meshed samples lie among those given, and how their signs are packed.
-struct Layout {
-    /// Meshed samples per axis.
-    size: [usize; 3],
-    /// The index of the first meshed sample.
-    origin: usize,
-    /// How far apart neighbours along each axis are in memory.
-    strides: [usize; 3],
-    /// Sign words a row.
-    words: usize,
-}
-
-impl Layout {
-    fn new<W>(samples: &Samples<'_, W>) -> Result<Self, MeshError> {
-        let (shape, padding) = (samples.shape(), u32::from(samples.is_padded()));
-        let least = 2 + 2 * padding;
-        if shape.size().iter().any(|&size| size < least) {
-            return Err(MeshError::TooSmall { shape, least });
-        }
-        let size = shape.size().map(|size| (size - 2 * padding) as usize);
-        Ok(Self { size, origin: shape.index([padding; 3]), strides: shape.strides(), words: size[0].div_ceil(64) })
-    }
-
-    /// The number of rows of samples.
-    const fn rows(&self) -> usize {
-        self.size[1] * self.size[2]
-    }
-
-    /// The index of the first meshed sample of row `y`, `z`.
-    const fn row_start(&self, y: usize, z: usize) -> usize {
-        self.origin + y * self.strides[1] + z * self.strides[2]
-    }
-
-    /// The sign words of row `row`.
-    fn row<'a>(&self, signs: &'a [u64], row: usize) -> &'a [u64] {
-        &signs[row * self.words..][..self.words]
-    }
-
-    /// Of word `word`, the bits of samples that have a neighbour at +x.
-    const fn x_edges(&self, word: usize) -> u64 {
-        let edges = self.size[0] - 1 - word * 64;
-        if edges >= 64 { u64::MAX } else { (1 << edges) - 1 }
-    }
-}
-
-/// The word of +x neighbours of `words[word]`.
-#[inline(always)]
-fn shifted(words: &[u64], word: usize) -> u64 {
-    let next = if word + 1 < words.len() { words[word + 1] } else { 0 };
-    words[word] >> 1 | next << 63
-}
-
-/// The positions of the set bits of `word`, lowest first.
-#[inline(always)]
-fn set_bits(mut word: u64) -> impl Iterator<Item = usize> {
-    core::iter::from_fn(move || {
-        if word == 0 {
-            return None;
-        }
-        let bit = word.trailing_zeros() as usize;
-        word &= word - 1;
-        Some(bit)
-    })
 }

@@ -2,6 +2,8 @@
 
 use core::fmt::Debug;
 
+use crate::simd::Simd;
+
 /// The sample at one lattice point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Voxel<W = i16> {
@@ -48,17 +50,30 @@ pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private:
 
 /// What the passes need of a weight, out of the users' reach.
 pub(crate) mod private {
+    use crate::simd::Simd;
+
     pub trait Sealed: Sized + Copy {
         /// The isovalue in this weight's own terms, so that [`Sealed::inside`] is one comparison.
         type Threshold: Copy;
+        /// Weights and their differences, without loss (for `f32`: what `f32` makes of them).
+        type Wide: Copy + Default;
         /// `isovalue`: in voxels, finite.
         fn threshold(isovalue: f32) -> Self::Threshold;
         /// Whether the sample lies below the isovalue.
         fn inside(self, threshold: Self::Threshold) -> bool;
+        /// The same for 32 samples, a bit each.
+        fn below<S: Simd>(weights: &[Self; 32], threshold: Self::Threshold) -> u32;
+        fn wide(self) -> Self::Wide;
         /// `a − b` in steps, for gradients; may be infinite or NaN.
-        fn difference(a: Self, b: Self) -> f32;
+        fn difference(a: Self, b: Self) -> Self::Wide;
+        /// Twice the difference, for gradients at an open border.
+        fn doubled(difference: Self::Wide) -> Self::Wide;
+        fn to_f32(wide: Self::Wide) -> f32;
+        /// How far along the edge from `a` to `b` the isovalue lies, before clamping, and whether it is so: where it is
+        /// not, [`Sealed::fraction`] knows. Has no branch. `isovalue`: in steps (voxels × `SCALE`).
+        fn quick_fraction(a: Self::Wide, b: Self::Wide, isovalue: f32) -> (f32, bool);
         /// How far along the edge from `a` to `b` the isovalue lies, before clamping; `a` and `b` lie on its two
-        /// sides. Finite. `isovalue`: in steps (voxels × `SCALE`).
+        /// sides. Finite, but for a NaN where both ends are the same limit of `f32`. `isovalue`: in steps (voxels × `SCALE`).
         fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
         /// The sample as a finite number, for the rare gradients that overflow.
         fn finite(self) -> f64;
@@ -66,7 +81,7 @@ pub(crate) mod private {
 }
 
 macro_rules! integer_weight {
-    ($type:ty, $scale:literal) => {
+    ($type:ty, $scale:literal, $below:ident) => {
         impl Weight for $type {
             const SCALE: f32 = $scale;
             const OUTSIDE: Self = <$type>::MAX;
@@ -111,14 +126,41 @@ macro_rules! integer_weight {
             }
 
             #[inline(always)]
-            fn difference(a: Self, b: Self) -> f32 {
-                (i32::from(a) - i32::from(b)) as f32
+            fn below<S: Simd>(weights: &[Self; 32], (threshold, all): Self::Threshold) -> u32 {
+                S::$below(weights, threshold) | if all { u32::MAX } else { 0 }
+            }
+
+            type Wide = i32;
+
+            #[inline(always)]
+            fn wide(self) -> i32 {
+                self.into()
+            }
+
+            #[inline(always)]
+            fn difference(a: Self, b: Self) -> i32 {
+                i32::from(a) - i32::from(b)
+            }
+
+            #[inline(always)]
+            fn doubled(difference: i32) -> i32 {
+                difference * 2
+            }
+
+            #[inline(always)]
+            fn to_f32(wide: i32) -> f32 {
+                wide as f32
+            }
+
+            #[inline(always)]
+            fn quick_fraction(a: i32, b: i32, isovalue: f32) -> (f32, bool) {
+                let (a, b) = (a as f32, b as f32);
+                ((isovalue - a) / (b - a), true)
             }
 
             #[inline(always)]
             fn fraction(a: Self, b: Self, isovalue: f32) -> f32 {
-                let (a, b) = (f32::from(a), f32::from(b));
-                (isovalue - a) / (b - a)
+                Self::quick_fraction(a.wide(), b.wide(), isovalue).0
             }
 
             fn finite(self) -> f64 {
@@ -128,8 +170,8 @@ macro_rules! integer_weight {
     };
 }
 
-integer_weight!(i8, 32.0);
-integer_weight!(i16, 256.0);
+integer_weight!(i8, 32.0, below_i8);
+integer_weight!(i16, 256.0, below_i16);
 
 impl Weight for f32 {
     const SCALE: f32 = 1.0;
@@ -158,16 +200,45 @@ impl private::Sealed for f32 {
     }
 
     #[inline(always)]
+    fn below<S: Simd>(weights: &[Self; 32], threshold: f32) -> u32 {
+        S::below_f32(weights, threshold)
+    }
+
+    type Wide = f32;
+
+    #[inline(always)]
+    fn wide(self) -> f32 {
+        self
+    }
+
+    #[inline(always)]
     fn difference(a: Self, b: Self) -> f32 {
         a - b
     }
 
     #[inline(always)]
-    fn fraction(a: Self, b: Self, isovalue: f32) -> f32 {
+    fn doubled(difference: f32) -> f32 {
+        difference * 2.0
+    }
+
+    #[inline(always)]
+    fn to_f32(wide: f32) -> f32 {
+        wide
+    }
+
+    #[inline(always)]
+    fn quick_fraction(a: f32, b: f32, isovalue: f32) -> (f32, bool) {
         let difference = b - a;
+        let size = difference.abs();
         // Outside this range the difference overflowed, lost its bits, or an end is not finite.
-        if (1e-30..1e30).contains(&difference.abs()) {
-            (isovalue - a) / difference
+        ((isovalue - a) / difference, (size >= 1e-30) & (size < 1e30))
+    }
+
+    #[inline(always)]
+    fn fraction(a: Self, b: Self, isovalue: f32) -> f32 {
+        let (fraction, sound) = Self::quick_fraction(a, b, isovalue);
+        if sound {
+            fraction
         } else {
             let (a, b) = (a.finite(), b.finite());
             ((f64::from(isovalue) - a) / (b - a)) as f32

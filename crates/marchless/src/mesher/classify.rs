@@ -1,57 +1,97 @@
-//! Pass 1: each sample's sign becomes one bit, a row at a time.
+//! Pass 1: the signs of one slab of samples, a bit each.
 
 use alloc::vec::Vec;
 
-use super::Layout;
-use crate::{lattice::Samples, sample::Weight};
+use super::slabs::Lattice;
+use crate::{sample::Weight, simd::Simd};
 
-/// Fills `signs` with one bit a meshed sample, set where it is inside; unused bits of a row's last word are zero.
-pub(super) fn classify<W: Weight>(
-    samples: &Samples<'_, W>,
-    layout: &Layout,
-    threshold: W::Threshold,
-    signs: &mut Vec<u64>,
-) {
-    signs.clear();
-    signs.reserve(layout.rows() * layout.words);
-    for z in 0..layout.size[2] {
-        for y in 0..layout.size[1] {
-            let row = &samples.weights()[layout.row_start(y, z)..][..layout.size[0]];
-            signs.extend(row.chunks(64).map(|weights| sign_word(weights, threshold)));
+/// The signs of one slab: `words` a row.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Signs {
+    words: Vec<u64>,
+    /// Whether all samples are inside, or outside, where all are the same; the words may then be old.
+    uniform: Option<bool>,
+}
+
+impl Signs {
+    pub(super) const fn new() -> Self {
+        Self { words: Vec::new(), uniform: None }
+    }
+
+    pub(super) const fn uniform(&self) -> Option<bool> {
+        self.uniform
+    }
+
+    /// All rows' words, one after the other. Unused bits of a row's last word are zero.
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// Takes in the slab `plane`: all its samples, padding included.
+    #[inline(always)]
+    pub(super) fn fill<S: Simd, W: Weight>(&mut self, lattice: &Lattice, plane: &[W], threshold: W::Threshold) {
+        self.uniform = uniform::<S, W>(plane, threshold);
+        if self.uniform.is_some() {
+            return;
+        }
+        self.words.resize(lattice.words * lattice.size[1], 0);
+        let rows = plane[lattice.origin..].chunks(lattice.stride);
+        for (row, words) in rows.zip(self.words.chunks_exact_mut(lattice.words)) {
+            sign_row::<S, W>(&row[..lattice.size[0]], threshold, words);
+        }
+    }
+
+    /// Makes sure that the words are there, for a slab beside one with other signs.
+    #[inline(always)]
+    pub(super) fn spell_out(&mut self, lattice: &Lattice) {
+        let Some(inside) = self.uniform else { return };
+        self.words.resize(lattice.words * lattice.size[1], 0);
+        for words in self.words.chunks_exact_mut(lattice.words) {
+            words.fill(if inside { u64::MAX } else { 0 });
+            words[lattice.words - 1] &= lattice.last_word;
         }
     }
 }
 
-/// The signs of up to 64 samples.
-///
-/// Each becomes a byte first, in a loop that the compiler turns into vector compares; one multiplication then
-/// gathers the lowest bits of eight bytes.
+/// Whether all samples of a slab, padding included, have the same sign; most slabs of a terrain do, and cost no more
+/// than reading them once. A slab that does not is found out at the first sample of the other sign.
 #[inline(always)]
-fn sign_word<W: Weight>(weights: &[W], threshold: W::Threshold) -> u64 {
-    let mut bytes = [0u8; 64];
-    for (byte, weight) in bytes.iter_mut().zip(weights) {
-        *byte = u8::from(weight.inside(threshold));
+fn uniform<S: Simd, W: Weight>(plane: &[W], threshold: W::Threshold) -> Option<bool> {
+    let inside = plane[plane.len() - 1].inside(threshold);
+    let expected = if inside { u32::MAX } else { 0 };
+    let (groups, rest) = plane.as_chunks::<128>();
+    for group in groups {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|quarter| {
+            let weights: &[W; 32] = group[32 * quarter..].first_chunk().expect("128 hold four times 32");
+            W::below::<S>(weights, threshold) ^ expected
+        });
+        if a | b | c | d != 0 {
+            return None;
+        }
     }
-    let mut word = 0;
-    for (index, &eight) in bytes.as_chunks::<8>().0[..weights.len().div_ceil(8)].iter().enumerate() {
-        word |= (u64::from_le_bytes(eight).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * index);
-    }
-    word
+    rest.iter().all(|weight| weight.inside(threshold) == inside).then_some(inside)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sample::private::Sealed as _;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn words_equal_a_plain_loop(weights in proptest::collection::vec(any::<i16>(), 0..=64), isovalue in -129f32..129.0) {
-            let plain = weights.iter().enumerate().fold(0, |word, (index, &weight)| {
-                word | u64::from(f32::from(weight) / 256.0 < isovalue) << index
-            });
-            prop_assert_eq!(sign_word(&weights, i16::threshold(isovalue)), plain);
+/// The signs of one row.
+#[inline(always)]
+fn sign_row<S: Simd, W: Weight>(row: &[W], threshold: W::Threshold, words: &mut [u64]) {
+    for (word, weights) in words.iter_mut().zip(row.chunks(64)) {
+        let (whole, rest) = weights.as_chunks::<32>();
+        *word = 0;
+        for (half, weights) in whole.iter().enumerate() {
+            *word |= u64::from(W::below::<S>(weights, threshold)) << (32 * half);
+        }
+        let start = 32 * whole.len();
+        if rest.len() <= 4 {
+            // A chunk of 32 cells has 33 samples a row.
+            for (index, weight) in rest.iter().enumerate() {
+                *word |= u64::from(weight.inside(threshold)) << (start + index);
+            }
+        } else {
+            let mut padded = [rest[0]; 32];
+            padded[..rest.len()].copy_from_slice(rest);
+            let signs = W::below::<S>(&padded, threshold) & (u32::MAX >> (32 - rest.len()));
+            *word |= u64::from(signs) << start;
         }
     }
 }

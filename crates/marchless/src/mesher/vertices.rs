@@ -1,229 +1,310 @@
-//! Pass 3: one vertex for each crossing, with its position, normal and material.
+//! Pass 2: one vertex for each crossing of a slab, with its position, normal and material.
+//!
+//! The crossings of many rows are listed first, so that what follows are long loops without branches: one that copies what
+//! each vertex is made of from the samples to arrays, and one that computes sixteen vertices side by side.
 
-use core::slice;
+use core::mem::MaybeUninit;
 
 use super::{
-    Layout, MeshSettings,
-    crossings::{Row, RowCrossings},
-    set_bits,
+    MeshSettings,
+    output::{Bounds, keep, room},
+    slabs::Lattice,
 };
 use crate::{
     buffer::MeshBuffer,
-    lattice::Samples,
     math::{sqrt, sqrt_f64},
     sample::Weight,
+    simd::Simd,
 };
 
 /// Crossings stay this far from the ends of their edge.
 const MARGIN: f32 = 1.0 / 1024.0;
 
-/// Fills the vertices of `out`: row by row, those on edges along x, then y, then z.
-pub(super) fn place<W: Weight>(
-    samples: &Samples<'_, W>,
-    layout: &Layout,
-    settings: &MeshSettings,
-    signs: &[u64],
-    rows: &[Row],
-    vertex_count: usize,
-    out: &mut MeshBuffer,
-) {
-    out.positions.resize(vertex_count, [0.0; 3]);
-    out.normals.resize(if settings.normals { vertex_count } else { 0 }, [0.0; 3]);
-    out.materials.resize(if samples.materials().is_some() { vertex_count } else { 0 }, 0);
-    let mut pass = Vertices {
-        samples,
-        layout,
-        isovalue: settings.isovalue * W::SCALE,
-        positions: out.positions.iter_mut(),
-        normals: out.normals.iter_mut(),
-        materials: out.materials.iter_mut(),
-    };
-    for z in 0..layout.size[2] {
-        for y in 0..layout.size[1] {
-            if !rows[y + z * layout.size[1]].is_empty() {
-                let crossings = RowCrossings::new(layout, signs, y, z);
-                if samples.is_padded() {
-                    pass.row::<true>(&crossings, y, z);
+/// Crossings that are gathered before they become vertices.
+const GATHERED: usize = 128;
+/// Room for them, the rest of the word that makes them enough, and sixteen side by side.
+const ROOM: usize = GATHERED + 64;
+
+/// The samples that edges of one axis need: whole slabs, padding included.
+#[derive(Clone, Copy)]
+pub(super) struct Planes<'a, W> {
+    /// The slab below the edges, those of their low and their high ends (the same for edges along x and y), and the one
+    /// above. At an open border the outermost one stands in for what is missing.
+    pub(super) slabs: [&'a [W]; 4],
+    /// Whether the gradient along z is one-sided at the low, and at the high ends.
+    pub(super) one_sided: [bool; 2],
+    /// The materials of the low and the high ends' slabs, where there are any.
+    pub(super) materials: Option<[&'a [u8]; 2]>,
+    /// The low ends' lattice position along z.
+    pub(super) z: usize,
+}
+
+/// Gathers crossings and turns them into vertices.
+pub(super) struct Vertices<W: Weight> {
+    /// Of all vertices made.
+    pub(super) bounds: Bounds,
+    gathered: usize,
+    x: [u32; ROOM],
+    y: [u32; ROOM],
+    /// The weights at the edges' ends.
+    ends: [[W::Wide; ROOM]; 2],
+    /// Twice the gradients there.
+    gradients: [[[W::Wide; ROOM]; 3]; 2],
+}
+
+impl<W: Weight> Vertices<W> {
+    pub(super) fn new() -> Self {
+        let none = [W::Wide::default(); ROOM];
+        Self {
+            bounds: Bounds::NONE,
+            gathered: 0,
+            x: [0; ROOM],
+            y: [0; ROOM],
+            ends: [none; 2],
+            gradients: [[none; 3]; 2],
+        }
+    }
+
+    /// Makes the vertices on all edges along `AXIS` and returns how many there are; `crossed` gives a word of crossings of
+    /// a row, one of the first `rows`.
+    #[inline(always)]
+    pub(super) fn place<S: Simd, const AXIS: usize>(
+        &mut self,
+        lattice: &Lattice,
+        planes: &Planes<'_, W>,
+        settings: &MeshSettings,
+        rows: usize,
+        crossed: impl Fn(usize, usize) -> u64,
+        out: &mut MeshBuffer,
+    ) -> u64 {
+        let mut made = 0;
+        for y in 0..rows {
+            for word in 0..lattice.words {
+                let crossed = crossed(y, word);
+                if crossed == 0 {
+                    continue;
+                }
+                let (x, rows) = (&mut self.x[self.gathered..], &mut self.y[self.gathered..]);
+                let (x, rows) = (x.first_chunk_mut(), rows.first_chunk_mut());
+                let (x, rows) = x.zip(rows).expect("there is room for another word's crossings");
+                self.gathered += S::positions(crossed, 64 * word as u32, y as u32, x, rows);
+                if self.gathered >= GATHERED {
+                    made += self.flush::<AXIS>(lattice, planes, settings, out);
+                }
+            }
+        }
+        made + self.flush::<AXIS>(lattice, planes, settings, out)
+    }
+
+    #[inline(always)]
+    fn flush<const AXIS: usize>(
+        &mut self,
+        lattice: &Lattice,
+        planes: &Planes<'_, W>,
+        settings: &MeshSettings,
+        out: &mut MeshBuffer,
+    ) -> u64 {
+        let count = self.gathered;
+        self.gathered = 0;
+        if count == 0 {
+            return 0;
+        }
+        if lattice.padded {
+            self.gather::<AXIS, true>(lattice, planes, settings, count);
+        } else {
+            self.gather::<AXIS, false>(lattice, planes, settings, count);
+        }
+        let isovalue = settings.isovalue * W::SCALE;
+        let side_by_side = count.next_multiple_of(16);
+        let positions = &mut room(&mut out.positions, side_by_side)[..side_by_side];
+        let sound = if settings.normals {
+            let normals = &mut room(&mut out.normals, side_by_side)[..side_by_side];
+            self.finish::<AXIS, true>(planes.z, isovalue, count, positions, normals)
+        } else {
+            self.finish::<AXIS, false>(planes.z, isovalue, count, positions, &mut [])
+        };
+        if !sound {
+            self.mend::<AXIS>(lattice, planes, settings, count, out);
+        }
+        // SAFETY: `finish` has written all of them.
+        #[expect(unsafe_code, reason = "spares filling the vectors with zeros first")]
+        unsafe {
+            keep(&mut out.positions, count);
+            if settings.normals {
+                keep(&mut out.normals, count);
+            }
+        }
+        if let Some(materials) = planes.materials {
+            let threshold = W::threshold(settings.isovalue);
+            out.materials.extend(self.x[..count].iter().zip(&self.y[..count]).map(|(&x, &y)| {
+                let low = lattice.index(x, y);
+                if planes.slabs[1][low].inside(threshold) {
+                    materials[0][low]
                 } else {
-                    pass.row::<false>(&crossings, y, z);
+                    materials[1][low + lattice.step::<AXIS>()]
+                }
+            }));
+        }
+        count as u64
+    }
+
+    /// Copies what the first `count` vertices are made of.
+    #[inline(always)]
+    fn gather<const AXIS: usize, const PADDED: bool>(
+        &mut self,
+        lattice: &Lattice,
+        planes: &Planes<'_, W>,
+        settings: &MeshSettings,
+        count: usize,
+    ) {
+        let [below, low, high, above] = planes.slabs;
+        for i in 0..count {
+            let (x, y) = (self.x[i], self.y[i]);
+            let a = lattice.index(x, y);
+            let b = a + lattice.step::<AXIS>();
+            self.ends[0][i] = low[a].wide();
+            self.ends[1][i] = high[b].wide();
+            if settings.normals {
+                let (xb, yb) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
+                // Along z an end's neighbours lie in other slabs.
+                let (next_to_low, next_to_high) = if AXIS == 2 { (high, low) } else { (above, below) };
+                let gradients = [
+                    lattice.gradient::<W, PADDED>([below, low, next_to_low], planes.one_sided[0], a, x, y),
+                    lattice.gradient::<W, PADDED>([next_to_high, high, above], planes.one_sided[1], b, xb, yb),
+                ];
+                for (end, gradient) in gradients.into_iter().enumerate() {
+                    for (axis, difference) in gradient.into_iter().enumerate() {
+                        self.gradients[end][axis][i] = difference;
+                    }
                 }
             }
         }
     }
-    debug_assert_eq!(pass.positions.len(), 0);
-    out.bounds = bounds(&out.positions);
+
+    /// Computes the vertices from what was gathered, into slices of the next multiple of 16 of `count`. Returns whether all of them are sound;
+    /// where they are not, a difference was out of the range in which `f32` computes well.
+    #[inline(always)]
+    fn finish<const AXIS: usize, const NORMALS: bool>(
+        &mut self,
+        z: usize,
+        isovalue: f32,
+        count: usize,
+        positions: &mut [MaybeUninit<[f32; 3]>],
+        normals: &mut [MaybeUninit<[f32; 3]>],
+    ) -> bool {
+        let z = z as f32;
+        let mut unsound = 0u32;
+        let Bounds { mut min, mut max } = self.bounds;
+        let room = positions.len();
+        let [a, b] = [&self.ends[0][..room], &self.ends[1][..room]];
+        let [xs, ys] = [&self.x[..room], &self.y[..room]];
+        let slopes = [0, 1].map(|end| [0, 1, 2].map(|axis| &self.gradients[end][axis][..room]));
+        if NORMALS {
+            assert_eq!(normals.len(), room);
+        }
+        for i in 0..room {
+            let within = i < count;
+            let (fraction, mut sound) = W::quick_fraction(a[i], b[i], isovalue);
+            let fraction = clamped(fraction);
+            let mut position = [xs[i] as f32, ys[i] as f32, z];
+            position[AXIS] += fraction;
+            positions[i].write(position);
+            // Positions are not negative, so that their bits are in the same order.
+            for axis in 0..3 {
+                let bits = position[axis].to_bits();
+                min[axis] = min[axis].min(if within { bits } else { u32::MAX });
+                max[axis] = max[axis].max(if within { bits } else { 0 });
+            }
+            if NORMALS {
+                let [x, y, z] = [0, 1, 2].map(|axis| {
+                    let [low, high] = slopes.map(|slope| W::to_f32(slope[axis][i]));
+                    low + (high - low) * fraction
+                });
+                let squared = x * x + y * y + z * z;
+                sound &= is_sound(squared);
+                let scale = 1.0 / sqrt(squared);
+                normals[i].write([x * scale, y * scale, z * scale]);
+            }
+            unsound |= u32::from(within & !sound);
+        }
+        if unsound == 0 {
+            self.bounds = Bounds { min, max };
+        }
+        unsound == 0
+    }
+
+    /// Computes the vertices one by one, with care.
+    #[cold]
+    #[inline(never)]
+    fn mend<const AXIS: usize>(
+        &mut self,
+        lattice: &Lattice,
+        planes: &Planes<'_, W>,
+        settings: &MeshSettings,
+        count: usize,
+        out: &mut MeshBuffer,
+    ) {
+        let [below, low, high, above] = planes.slabs;
+        let (next_to_low, next_to_high) = if AXIS == 2 { (high, low) } else { (above, below) };
+        for i in 0..count {
+            let (x, y) = (self.x[i], self.y[i]);
+            let a = lattice.index(x, y);
+            let b = a + lattice.step::<AXIS>();
+            let (xb, yb) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
+            let fraction = crossing_fraction(low[a], high[b], settings.isovalue * W::SCALE);
+            let mut position = [x as f32, y as f32, planes.z as f32];
+            position[AXIS] += fraction;
+            room(&mut out.positions, count)[i].write(position);
+            self.bounds.include(position);
+            if settings.normals {
+                let gradient = [0, 1, 2].map(|axis| {
+                    let [low, high] = [0, 1].map(|end| W::to_f32(self.gradients[end][axis][i]));
+                    low + (high - low) * fraction
+                });
+                let normal = unit(gradient).unwrap_or_else(|| {
+                    let ends = [
+                        lattice.steady_gradient([below, low, next_to_low], planes.one_sided[0], a, x, y),
+                        lattice.steady_gradient([next_to_high, high, above], planes.one_sided[1], b, xb, yb),
+                    ];
+                    let mut fallback = [0.0; 3];
+                    fallback[AXIS] = if low[a].inside(W::threshold(settings.isovalue)) { 1.0 } else { -1.0 };
+                    steady_unit(ends, fraction, fallback)
+                });
+                room(&mut out.normals, count)[i].write(normal);
+            }
+        }
+    }
 }
 
 /// How far along the edge from `a` to `b` its vertex lies; `isovalue` in steps (voxels × `SCALE`).
 #[inline(always)]
 pub(crate) fn crossing_fraction<W: Weight>(a: W, b: W, isovalue: f32) -> f32 {
-    let fraction = W::fraction(a, b, isovalue);
-    // A NaN (both ends at the same limit of `f32`) fails the comparison.
-    if fraction > MARGIN { fraction.min(1.0 - MARGIN) } else { MARGIN }
+    clamped(W::fraction(a, b, isovalue))
 }
 
-/// The pass, with what is still to be filled.
-struct Vertices<'a, W> {
-    samples: &'a Samples<'a, W>,
-    layout: &'a Layout,
-    /// In steps.
-    isovalue: f32,
-    positions: slice::IterMut<'a, [f32; 3]>,
-    normals: slice::IterMut<'a, [f32; 3]>,
-    materials: slice::IterMut<'a, u8>,
-}
-
-impl<W: Weight> Vertices<'_, W> {
-    #[inline(always)]
-    fn row<const PADDED: bool>(&mut self, crossings: &RowCrossings<'_>, y: usize, z: usize) {
-        let low = Surroundings::<W, PADDED>::new(self.samples, self.layout, y, z);
-        self.edges::<PADDED, 0>(crossings, &low, &low, y, z);
-        if y + 1 < self.layout.size[1] {
-            let high = Surroundings::new(self.samples, self.layout, y + 1, z);
-            self.edges::<PADDED, 1>(crossings, &low, &high, y, z);
-        }
-        if z + 1 < self.layout.size[2] {
-            let high = Surroundings::new(self.samples, self.layout, y, z + 1);
-            self.edges::<PADDED, 2>(crossings, &low, &high, y, z);
-        }
-    }
-
-    /// The vertices on the row's edges along `AXIS`; `low` and `high`: the rows of their ends.
-    #[inline(always)]
-    fn edges<const PADDED: bool, const AXIS: usize>(
-        &mut self,
-        crossings: &RowCrossings<'_>,
-        low: &Surroundings<'_, W, PADDED>,
-        high: &Surroundings<'_, W, PADDED>,
-        y: usize,
-        z: usize,
-    ) {
-        for word in 0..self.layout.words {
-            let inside = crossings.signs(word);
-            for bit in set_bits(crossings.word(word)[AXIS]) {
-                let x = word * 64 + bit;
-                let high_x = x + usize::from(AXIS == 0);
-                let fraction = crossing_fraction(low.weight(x), high.weight(high_x), self.isovalue);
-                let low_is_inside = inside >> bit & 1 == 1;
-                if let Some(position) = self.positions.next() {
-                    *position = [x as f32, y as f32, z as f32];
-                    position[AXIS] += fraction;
-                }
-                if let Some(normal) = self.normals.next() {
-                    *normal = match unit(mix(low.gradient(x), high.gradient(high_x), fraction)) {
-                        Some(normal) => normal,
-                        None => {
-                            let mut fallback = [0.0; 3];
-                            fallback[AXIS] = if low_is_inside { 1.0 } else { -1.0 };
-                            steady_unit(low.steady_gradient(x), high.steady_gradient(high_x), fraction, fallback)
-                        }
-                    };
-                }
-                if let (Some(material), Some(materials)) = (self.materials.next(), self.samples.materials()) {
-                    let low_index = self.layout.row_start(y, z) + x;
-                    let high_index = low_index + self.layout.strides[AXIS];
-                    *material = materials[if low_is_inside { low_index } else { high_index }];
-                }
-            }
-        }
-    }
-}
-
-/// A row of samples and the four rows around it, from which the gradients on it are made. All slices start with the first sample
-/// that is given, padding or not, and are equally long.
-struct Surroundings<'a, W, const PADDED: bool> {
-    row: &'a [W],
-    below: [&'a [W]; 2],
-    above: [&'a [W]; 2],
-    /// What makes one-sided differences comparable to central ones, which span twice the distance.
-    scale: [f32; 2],
-}
-
-impl<'a, W: Weight, const PADDED: bool> Surroundings<'a, W, PADDED> {
-    #[inline(always)]
-    fn new(samples: &Samples<'a, W>, layout: &Layout, y: usize, z: usize) -> Self {
-        let len = layout.size[0] + 2 * usize::from(PADDED);
-        let start = layout.row_start(y, z) - usize::from(PADDED);
-        let row = |start: usize| &samples.weights()[start..][..len];
-        let mut around = Self { row: row(start), below: [row(start); 2], above: [row(start); 2], scale: [1.0; 2] };
-        for (index, (axis, at)) in [(1, y), (2, z)].into_iter().enumerate() {
-            let (first, last) = (!PADDED && at == 0, !PADDED && at + 1 == layout.size[axis]);
-            if !first {
-                around.below[index] = row(start - layout.strides[axis]);
-            }
-            if !last {
-                around.above[index] = row(start + layout.strides[axis]);
-            }
-            if first || last {
-                around.scale[index] = 2.0;
-            }
-        }
-        around
-    }
-
-    /// The weight of the row's meshed sample `x`.
-    #[inline(always)]
-    fn weight(&self, x: usize) -> W {
-        self.row[x + usize::from(PADDED)]
-    }
-
-    /// Twice the gradient at sample `x`.
-    #[inline(always)]
-    fn gradient(&self, x: usize) -> [f32; 3] {
-        let (low, at, high) = self.span(x);
-        let gradient = [
-            W::difference(self.row[high], self.row[low]),
-            W::difference(self.above[0][at], self.below[0][at]),
-            W::difference(self.above[1][at], self.below[1][at]),
-        ];
-        if PADDED {
-            return gradient;
-        }
-        let x_scale = if high - low == 1 { 2.0 } else { 1.0 };
-        [gradient[0] * x_scale, gradient[1] * self.scale[0], gradient[2] * self.scale[1]]
-    }
-
-    /// The same, where differences may overflow.
-    #[cold]
-    fn steady_gradient(&self, x: usize) -> [f64; 3] {
-        let (low, at, high) = self.span(x);
-        let x_scale = if high - low == 1 { 2.0 } else { 1.0 };
-        [
-            (self.row[high].finite() - self.row[low].finite()) * x_scale,
-            (self.above[0][at].finite() - self.below[0][at].finite()) * f64::from(self.scale[0]),
-            (self.above[1][at].finite() - self.below[1][at].finite()) * f64::from(self.scale[1]),
-        ]
-    }
-
-    /// Where in the slices sample `x` and its neighbours along x are; at an open border, itself.
-    #[inline(always)]
-    fn span(&self, x: usize) -> (usize, usize, usize) {
-        if PADDED { (x, x + 1, x + 2) } else { (x.saturating_sub(1), x, (x + 1).min(self.row.len() - 1)) }
-    }
-}
-
+/// A NaN (both ends at the same limit of `f32`) fails the first comparison.
 #[inline(always)]
-fn mix(a: [f32; 3], b: [f32; 3], fraction: f32) -> [f32; 3] {
-    let [ax, ay, az] = a;
-    let [bx, by, bz] = b;
-    [ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction]
+fn clamped(fraction: f32) -> f32 {
+    let fraction = if fraction > MARGIN { fraction } else { MARGIN };
+    if fraction < 1.0 - MARGIN { fraction } else { 1.0 - MARGIN }
+}
+
+/// Whether `f32` computes well with a gradient whose squared length this is.
+#[inline(always)]
+const fn is_sound(squared: f32) -> bool {
+    (squared >= 1e-30) & (squared < 1e30)
 }
 
 /// The direction of `gradient`, where its length can be computed well in `f32`.
-#[inline(always)]
 fn unit(gradient: [f32; 3]) -> Option<[f32; 3]> {
     let [x, y, z] = gradient;
     let squared = x * x + y * y + z * z;
-    if !(1e-30..1e30).contains(&squared) {
-        return None;
-    }
     let scale = 1.0 / sqrt(squared);
-    Some([x * scale, y * scale, z * scale])
+    is_sound(squared).then_some([x * scale, y * scale, z * scale])
 }
 
 /// The direction of a gradient that is tiny, huge, not finite or zero; `fallback` where it has none.
-#[cold]
-fn steady_unit(a: [f64; 3], b: [f64; 3], fraction: f32, fallback: [f32; 3]) -> [f32; 3] {
+fn steady_unit([a, b]: [[f64; 3]; 2], fraction: f32, fallback: [f32; 3]) -> [f32; 3] {
     let gradient = [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * f64::from(fraction));
     let largest = gradient.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
     if largest == 0.0 {
@@ -232,16 +313,4 @@ fn steady_unit(a: [f64; 3], b: [f64; 3], fraction: f32, fallback: [f32; 3]) -> [
     let [x, y, z] = gradient.map(|v| v / largest);
     let length = sqrt_f64(x * x + y * y + z * z);
     [x, y, z].map(|v| (v / length) as f32)
-}
-
-fn bounds(positions: &[[f32; 3]]) -> Option<[[f32; 3]; 2]> {
-    let &first = positions.first()?;
-    let (mut min, mut max) = (first, first);
-    for position in positions {
-        for axis in 0..3 {
-            min[axis] = if position[axis] < min[axis] { position[axis] } else { min[axis] };
-            max[axis] = if position[axis] > max[axis] { position[axis] } else { max[axis] };
-        }
-    }
-    Some([min, max])
 }

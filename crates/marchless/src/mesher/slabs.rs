@@ -1,0 +1,299 @@
+//! The order of things: what becomes of one slab of samples after the other, and of a whole volume.
+
+use super::{
+    MeshError, MeshSettings,
+    classify::Signs,
+    triangles::{self, FirstVertices},
+    vertices::{Planes, Vertices},
+};
+use crate::{
+    buffer::MeshBuffer,
+    lattice::Samples,
+    sample::Weight,
+    simd::{Job, Simd},
+};
+
+/// How the samples of a slab lie in memory, and how their signs are packed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lattice {
+    /// Meshed samples per axis.
+    pub(super) size: [usize; 3],
+    /// Whether there is a layer of padding around them.
+    pub(super) padded: bool,
+    /// The index of the slab's first meshed sample.
+    pub(super) origin: usize,
+    /// How far apart in memory neighbours along y are.
+    pub(super) stride: usize,
+    /// Sign words a row.
+    pub(super) words: usize,
+    /// The bits of a row's last word that are samples.
+    pub(super) last_word: u64,
+}
+
+impl Lattice {
+    pub(super) fn of<W>(samples: &Samples<'_, W>) -> Result<Self, MeshError> {
+        let (shape, padding) = (samples.shape(), u32::from(samples.is_padded()));
+        let least = 2 + 2 * padding;
+        if shape.size().iter().any(|&size| size < least) {
+            return Err(MeshError::TooSmall { shape, least });
+        }
+        let size = shape.size().map(|size| (size - 2 * padding) as usize);
+        let stride = shape.size()[0] as usize;
+        Ok(Self {
+            size,
+            padded: samples.is_padded(),
+            origin: padding as usize * (1 + stride),
+            stride,
+            words: size[0].div_ceil(64),
+            last_word: u64::MAX >> (size[0].next_multiple_of(64) - size[0]),
+        })
+    }
+
+    /// The index in its slab of the meshed sample at `x`, `y`.
+    #[inline(always)]
+    pub(super) const fn index(&self, x: u32, y: u32) -> usize {
+        self.origin + y as usize * self.stride + x as usize
+    }
+
+    /// How far apart in memory the ends of an edge along `AXIS` are in their slabs.
+    #[inline(always)]
+    pub(super) const fn step<const AXIS: usize>(&self) -> usize {
+        match AXIS {
+            0 => 1,
+            1 => self.stride,
+            _ => 0,
+        }
+    }
+
+    /// Of word `word`, the bits of samples that have a neighbour at +x.
+    #[inline(always)]
+    pub(super) const fn x_edges(&self, word: usize) -> u64 {
+        let edges = self.size[0] - 1 - word * 64;
+        if edges >= 64 { u64::MAX } else { (1 << edges) - 1 }
+    }
+
+    /// The crossings on edges along x in word `word` of a row of signs.
+    #[inline(always)]
+    pub(super) fn crossed_x(&self, row: &[u64], word: usize) -> u64 {
+        (row[word] ^ shifted(row, word)) & self.x_edges(word)
+    }
+
+    /// Twice the gradient at the sample at `x`, `y` with index `at`, from its slab and those `below` and `above` it.
+    #[inline(always)]
+    pub(super) fn gradient<W: Weight, const PADDED: bool>(
+        &self,
+        [below, slab, above]: [&[W]; 3],
+        one_sided_z: bool,
+        at: usize,
+        x: u32,
+        y: u32,
+    ) -> [W::Wide; 3] {
+        if PADDED {
+            return [
+                W::difference(slab[at + 1], slab[at - 1]),
+                W::difference(slab[at + self.stride], slab[at - self.stride]),
+                W::difference(above[at], below[at]),
+            ];
+        }
+        let ([low, high], one_sided) = self.neighbours(at, x, y);
+        let differences = [
+            W::difference(slab[high[0]], slab[low[0]]),
+            W::difference(slab[high[1]], slab[low[1]]),
+            W::difference(above[at], below[at]),
+        ];
+        let one_sided = [one_sided[0], one_sided[1], one_sided_z];
+        core::array::from_fn(|k| if one_sided[k] { W::doubled(differences[k]) } else { differences[k] })
+    }
+
+    /// The same, where differences may overflow.
+    pub(super) fn steady_gradient<W: Weight>(
+        &self,
+        [below, slab, above]: [&[W]; 3],
+        one_sided_z: bool,
+        at: usize,
+        x: u32,
+        y: u32,
+    ) -> [f64; 3] {
+        let ([low, high], one_sided) = self.neighbours(at, x, y);
+        let differences = [
+            slab[high[0]].finite() - slab[low[0]].finite(),
+            slab[high[1]].finite() - slab[low[1]].finite(),
+            above[at].finite() - below[at].finite(),
+        ];
+        let one_sided = [one_sided[0], one_sided[1], one_sided_z];
+        core::array::from_fn(|k| if one_sided[k] { differences[k] * 2.0 } else { differences[k] })
+    }
+
+    /// The indices of a sample's lower and higher neighbours along x and y, and whether it is one of them itself.
+    #[inline(always)]
+    fn neighbours(&self, at: usize, x: u32, y: u32) -> ([[usize; 2]; 2], [bool; 2]) {
+        let first = [!self.padded && x == 0, !self.padded && y == 0];
+        let last = [!self.padded && x as usize + 1 == self.size[0], !self.padded && y as usize + 1 == self.size[1]];
+        let low = [at - usize::from(!first[0]), at - if first[1] { 0 } else { self.stride }];
+        let high = [at + usize::from(!last[0]), at + if last[1] { 0 } else { self.stride }];
+        ([low, high], [first[0] | last[0], first[1] | last[1]])
+    }
+}
+
+/// The word of +x neighbours of `row[word]`.
+#[inline(always)]
+pub(super) fn shifted(row: &[u64], word: usize) -> u64 {
+    let next = if word + 1 < row.len() { row[word + 1] } else { 0 };
+    row[word] >> 1 | next << 63
+}
+
+/// A slab of samples with those around it: whole slabs, padding included. Beyond an open border the outermost slab stands in
+/// for those that are missing.
+#[derive(Clone, Copy)]
+pub(super) struct Window<'a, W> {
+    /// The slabs two below, one below, the slab itself, and the one above.
+    pub(super) slabs: [&'a [W]; 4],
+    /// The materials of the slab below and of the slab itself, where there are any.
+    pub(super) materials: Option<[&'a [u8]; 2]>,
+    /// The slab's lattice position along z.
+    pub(super) z: usize,
+    /// Whether the gradient along z is one-sided on the slab below, and on the slab itself.
+    pub(super) one_sided: [bool; 2],
+}
+
+/// What is remembered from slab to slab.
+#[derive(Clone, Debug)]
+pub(super) struct Slabs {
+    /// The signs of the slab before, and of the newest one.
+    signs: [Signs; 2],
+    /// The first vertices of the newest slab on edges along x and y.
+    first: [u64; 2],
+    /// All vertices so far.
+    vertices: u64,
+}
+
+impl Slabs {
+    pub(super) const fn new() -> Self {
+        Self { signs: [Signs::new(), Signs::new()], first: [0; 2], vertices: 0 }
+    }
+
+    /// Takes in the next slab: makes the vertices on edges from the slab before and on those within the slab, and the
+    /// triangles in between. Of the first slab (of a volume or a part of it) there is no slab before; of the last one of a part, the
+    /// vertices within belong to the next part and are not made.
+    #[inline(always)]
+    pub(super) fn step<S: Simd, W: Weight>(
+        &mut self,
+        lattice: &Lattice,
+        window: &Window<'_, W>,
+        place: Place,
+        settings: &MeshSettings,
+        pass: &mut Vertices<W>,
+        out: &mut MeshBuffer,
+    ) -> Result<(), MeshError> {
+        if place == Place::First {
+            self.vertices = 0;
+        }
+        let (words, rows, [_, low, slab, above]) = (lattice.words, lattice.size[1], window.slabs);
+        let [before, newest] = &mut self.signs;
+        core::mem::swap(before, newest);
+        newest.fill::<S, W>(lattice, slab, W::threshold(settings.isovalue));
+        let joined = place != Place::First && (before.uniform().is_none() || before.uniform() != newest.uniform());
+        let mut first =
+            FirstVertices { x: [self.first[0] as u32, 0], y: [self.first[1] as u32, 0], z: self.vertices as u32 };
+        if joined {
+            before.spell_out(lattice);
+            newest.spell_out(lattice);
+            let planes = Planes {
+                slabs: window.slabs,
+                one_sided: window.one_sided,
+                materials: window.materials,
+                z: window.z.wrapping_sub(1),
+            };
+            let (low, high) = (before.words(), newest.words());
+            let crossed = |y: usize, word: usize| low[y * words + word] ^ high[y * words + word];
+            self.vertices += pass.place::<S, 2>(lattice, &planes, settings, rows, crossed, out);
+        }
+        self.first = [self.vertices; 2];
+        if newest.uniform().is_none() {
+            let planes = Planes {
+                slabs: [low, slab, slab, above],
+                one_sided: [window.one_sided[1]; 2],
+                materials: window.materials.map(|[_, materials]| [materials; 2]),
+                z: window.z,
+            };
+            let signs = newest.words();
+            let along_x = |y: usize, word: usize| lattice.crossed_x(&signs[y * words..][..words], word);
+            let along_y = |y: usize, word: usize| signs[y * words + word] ^ signs[(y + 1) * words + word];
+            if place == Place::Last {
+                let places = (0..rows).flat_map(|y| (0..words).map(move |word| (y, word)));
+                self.first[1] += places.map(|(y, word)| u64::from(along_x(y, word).count_ones())).sum::<u64>();
+            } else {
+                self.vertices += pass.place::<S, 0>(lattice, &planes, settings, rows, along_x, out);
+                self.first[1] = self.vertices;
+                self.vertices += pass.place::<S, 1>(lattice, &planes, settings, rows - 1, along_y, out);
+            }
+        }
+        if self.vertices > u64::from(u32::MAX) {
+            return Err(MeshError::TooManyVertices { found: self.vertices });
+        }
+        if joined {
+            (first.x[1], first.y[1]) = (self.first[0] as u32, self.first[1] as u32);
+            triangles::join::<S>(lattice, before, newest, &first, &mut out.indices);
+        }
+        Ok(())
+    }
+}
+
+/// Where a slab stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// First of a volume, or of a part of one.
+    First,
+    /// After another one.
+    Next,
+    /// First of the next part of the volume.
+    Last,
+}
+
+/// A volume to be meshed, or a part of it.
+pub(super) struct Volume<'a, W> {
+    pub(super) samples: Samples<'a, W>,
+    pub(super) lattice: Lattice,
+    pub(super) settings: &'a MeshSettings,
+    pub(super) slabs: &'a mut Slabs,
+    pub(super) out: &'a mut MeshBuffer,
+}
+
+impl<W: Weight> Job for Volume<'_, W> {
+    type Output = Result<(), MeshError>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let Self { samples, lattice, settings, slabs, out } = self;
+        let depth = lattice.size[2];
+        let mut pass = Vertices::new();
+        for z in 0..depth {
+            let window = Window::of(&samples, &lattice, z);
+            let place = if z == 0 { Place::First } else { Place::Next };
+            slabs.step::<S, W>(&lattice, &window, place, settings, &mut pass, out)?;
+        }
+        pass.bounds.widen(out);
+        Ok(())
+    }
+}
+
+impl<'a, W: Weight> Window<'a, W> {
+    /// The window around the meshed slab `z` of whole samples.
+    #[inline(always)]
+    fn of(samples: &Samples<'a, W>, lattice: &Lattice, z: usize) -> Self {
+        let [_, _, len] = samples.shape().strides();
+        let last = samples.shape().size()[2] as usize - 1;
+        let at = z + usize::from(lattice.padded);
+        let index = |at: usize| at.min(last) * len;
+        let at_border = |at: usize| !lattice.padded && (at == 0 || at == last);
+        let numbers = [at.saturating_sub(2), at.saturating_sub(1), at, at + 1];
+        Self {
+            slabs: numbers.map(|at| &samples.weights()[index(at)..][..len]),
+            materials: samples
+                .materials()
+                .map(|materials| [at.saturating_sub(1), at].map(|at| &materials[index(at)..][..len])),
+            z,
+            one_sided: [at_border(at.saturating_sub(1)), at_border(at)],
+        }
+    }
+}

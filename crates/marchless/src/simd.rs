@@ -1,0 +1,150 @@
+//! Backends: the few steps of meshing that a processor's vector instructions do better than a compiler's.
+//!
+//! One interface ([`Simd`]), one file a backend, and no `cfg(target_arch)` elsewhere. Everything that is generic over a
+//! backend is inlined into [`dispatch`]'s functions, which switch the instructions on, so that the plain loops between these
+//! steps are vectorised for the same processor. All backends give the same bits: comparisons, copies, and
+//! operations that IEEE 754 rounds exactly; no fused multiply-add, no reciprocal estimates.
+
+use core::mem::MaybeUninit;
+
+mod portable;
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod sse2;
+
+/// Which instructions meshing uses. The meshes are the same, bit for bit, whichever it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Backend {
+    /// Words and plain loops; on every machine.
+    Portable,
+    /// What every x86-64 has.
+    Sse2,
+    /// AVX2 with BMI1, BMI2, LZCNT and POPCNT: Intel since Haswell, AMD since Excavator.
+    Avx2,
+    /// AVX-512 F, BW, DQ, VL and VBMI2 on top of it: Intel since Ice Lake, AMD since Zen 4.
+    Avx512,
+}
+
+impl Backend {
+    /// All of them, the slowest first.
+    pub const ALL: [Self; 4] = [Self::Portable, Self::Sse2, Self::Avx2, Self::Avx512];
+
+    /// A short name in lower case.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Sse2 => "sse2",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+
+    /// The fastest that there is here. Without the feature `std` it is what the crate was compiled for; with it, what the
+    /// processor offers.
+    pub fn fastest() -> Self {
+        Self::ALL.into_iter().rev().find(|backend| backend.is_available()).unwrap_or(Self::Portable)
+    }
+
+    /// Whether the processor has these instructions (without the feature `std`: whether the crate was compiled for them).
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse2 => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2::is_available(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::is_available(),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => false,
+        }
+    }
+}
+
+/// `all(NAME…)`: whether all these features can be used.
+#[cfg(all(target_arch = "x86_64", feature = "std"))]
+macro_rules! all {
+    ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
+}
+#[cfg(all(target_arch = "x86_64", not(feature = "std")))]
+macro_rules! all {
+    ($($feature:tt),*) => { true $(&& cfg!(target_feature = $feature))* };
+}
+#[cfg(target_arch = "x86_64")]
+use all;
+
+/// Work that some backend does.
+pub(crate) trait Job {
+    type Output;
+    /// Must be `#[inline(always)]`, down to the last function that is generic over `S`.
+    fn run<S: Simd>(self) -> Self::Output;
+}
+
+/// Does `job` with `backend`, which must be available; with the portable one where it is not.
+pub(crate) fn dispatch<J: Job>(backend: Backend, job: J) -> J::Output {
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        Backend::Sse2 => job.run::<sse2::Sse2>(),
+        #[cfg(target_arch = "x86_64")]
+        Backend::Avx2 if backend.is_available() => {
+            // SAFETY: the processor has the instructions.
+            #[expect(unsafe_code, reason = "the one place where instructions are switched on")]
+            unsafe {
+                avx2::run(job)
+            }
+        }
+        #[cfg(target_arch = "x86_64")]
+        Backend::Avx512 if backend.is_available() => {
+            // SAFETY: the processor has the instructions.
+            #[expect(unsafe_code, reason = "the one place where instructions are switched on")]
+            unsafe {
+                avx512::run(job)
+            }
+        }
+        _ => job.run::<portable::Portable>(),
+    }
+}
+
+/// What the backends do each in their way. [`portable`] is the plain version that the tests hold the others to.
+pub trait Simd {
+    /// One bit a weight, set where it is below `threshold`.
+    fn below_i8(weights: &[i8; 32], threshold: i8) -> u32;
+    /// One bit a weight, set where it is below `threshold`.
+    fn below_i16(weights: &[i16; 32], threshold: i16) -> u32;
+    /// One bit a weight, set where it is below `threshold`; NaN is not.
+    fn below_f32(weights: &[f32; 32], threshold: f32) -> u32;
+
+    /// Writes the positions of the set bits of `word`, lowest first, each plus `base`, to `positions`, and `row` for each to
+    /// `rows`; returns how many there are. What is written behind them means nothing.
+    fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize;
+
+    /// Writes the case of each cell whose bit is set in `active`, lowest first, to `cases`; returns how many there are. What is written behind them means
+    /// nothing. Bit `x` of `corners[k]` is corner `k` of cell `x`.
+    fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize;
+
+    /// Writes the triangles of cells, one after the other: for each of `codes`, 16 indices made from the running `counters` by the
+    /// code's row of `tables`, of which the next cell overwrites those that are too many. Returns how many indices count: that
+    /// many have been written.
+    ///
+    /// `indices` holds 16 for each code at least.
+    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize;
+}
+
+/// Codes of [`Tables`]; a power of two, so that a masked code needs no check.
+pub(crate) const CODES: usize = 512;
+
+/// What a cell of each code adds to the mesh. See `mesher/triangles.rs`, which derives them.
+pub struct Tables {
+    /// For each of up to 15 indices: bits 0–2 name the counter, bit 3 is set where the vertex lies on the high side of the
+    /// cell, bit 4 where it is the one behind the counter's.
+    pub vertices: [[u8; 16]; CODES],
+    /// How far the cell advances each counter: 0 or 1.
+    pub steps: [[u8; 8]; CODES],
+    /// Indices, 0–15.
+    pub counts: [u8; CODES],
+}

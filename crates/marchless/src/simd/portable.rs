@@ -1,0 +1,86 @@
+//! Words and plain loops: the oracle of the other backends, and what runs where there are none.
+
+use core::mem::MaybeUninit;
+
+use super::{CODES, Simd, Tables};
+
+pub(super) struct Portable;
+
+impl Simd for Portable {
+    #[inline(always)]
+    fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
+        below(weights, threshold)
+    }
+
+    #[inline(always)]
+    fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
+        below(weights, threshold)
+    }
+
+    #[inline(always)]
+    fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
+        below(weights, threshold)
+    }
+
+    #[inline(always)]
+    fn positions(mut word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
+        let count = word.count_ones() as usize;
+        for (position, at) in positions.iter_mut().zip(rows) {
+            if word == 0 {
+                break;
+            }
+            (*position, *at) = (base + word.trailing_zeros(), row);
+            word &= word - 1;
+        }
+        count
+    }
+
+    #[inline(always)]
+    fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
+        let count = active.count_ones() as usize;
+        for case in cases {
+            if active == 0 {
+                break;
+            }
+            let x = active.trailing_zeros();
+            *case = (0..8).map(|corner| ((corners[corner] >> x & 1) as u16) << corner).sum();
+            active &= active - 1;
+        }
+        count
+    }
+
+    #[inline(always)]
+    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+        let mut end = 0;
+        for &code in codes {
+            let code = usize::from(code) % CODES;
+            let (steps, mut vertices) = (&tables.steps[code], [0; 16]);
+            for lane in 0..8 {
+                vertices[lane] = counters[lane];
+                counters[lane] += u32::from(steps[lane]);
+                vertices[8 + lane] = counters[lane];
+            }
+            if let Some(indices) = indices[end..].first_chunk_mut::<16>() {
+                for (index, vertex) in indices.iter_mut().zip(tables.vertices[code]) {
+                    index.write(vertices[usize::from(vertex) % 16]);
+                }
+            }
+            end += usize::from(tables.counts[code]);
+        }
+        end
+    }
+}
+
+/// Each comparison becomes a byte first, in a loop that the compiler turns into vector compares; one multiplication then
+/// gathers the lowest bits of eight bytes.
+#[inline(always)]
+fn below<W: Copy + PartialOrd>(weights: &[W; 32], threshold: W) -> u32 {
+    let mut bytes = [0u8; 32];
+    for (byte, &weight) in bytes.iter_mut().zip(weights) {
+        *byte = u8::from(weight < threshold);
+    }
+    let [a, b, c, d] = [0, 1, 2, 3].map(|eight| {
+        (u64::from_le_bytes(bytes.as_chunks::<8>().0[eight]).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
+    });
+    a | b << 8 | c << 16 | d << 24
+}

@@ -1,0 +1,61 @@
+//! SSE2, which every x86-64 has: signs sixteen at a time, the rest as in the portable backend.
+#![expect(unsafe_code, reason = "vector loads take raw pointers")]
+
+use core::{arch::x86_64::*, mem::MaybeUninit};
+
+use super::{Simd, Tables, portable::Portable};
+
+pub(super) struct Sse2;
+
+impl Simd for Sse2 {
+    #[inline(always)]
+    fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
+        // SAFETY: SSE2 is there on every x86-64; both loads lie within the 32 weights.
+        unsafe {
+            let threshold = _mm_set1_epi8(threshold);
+            let load = |index: usize| _mm_loadu_si128(weights.as_ptr().add(16 * index).cast());
+            let half = |index| _mm_movemask_epi8(_mm_cmplt_epi8(load(index), threshold)) as u32;
+            half(0) | half(1) << 16
+        }
+    }
+
+    #[inline(always)]
+    fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
+        // SAFETY: SSE2 is there on every x86-64; all loads lie within the 32 weights.
+        unsafe {
+            let threshold = _mm_set1_epi16(threshold);
+            let below =
+                |index: usize| _mm_cmplt_epi16(_mm_loadu_si128(weights.as_ptr().add(8 * index).cast()), threshold);
+            let half = |index| _mm_movemask_epi8(_mm_packs_epi16(below(index), below(index + 1))) as u32;
+            half(0) | half(2) << 16
+        }
+    }
+
+    #[inline(always)]
+    fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
+        // SAFETY: SSE2 is there on every x86-64; all loads lie within the 32 weights.
+        unsafe {
+            let threshold = _mm_set1_ps(threshold);
+            let below =
+                |index: usize| _mm_castps_si128(_mm_cmplt_ps(_mm_loadu_ps(weights.as_ptr().add(4 * index)), threshold));
+            let eight = |index| _mm_packs_epi32(below(index), below(index + 1));
+            let half = |index| _mm_movemask_epi8(_mm_packs_epi16(eight(index), eight(index + 2))) as u32;
+            half(0) | half(4) << 16
+        }
+    }
+
+    #[inline(always)]
+    fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
+        Portable::positions(word, base, row, positions, rows)
+    }
+
+    #[inline(always)]
+    fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
+        Portable::cases(corners, active, cases)
+    }
+
+    #[inline(always)]
+    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+        Portable::triangles(tables, codes, counters, indices)
+    }
+}
