@@ -1,0 +1,61 @@
+//! One field of one size, and our mesher on it.
+
+use core::{cell::OnceCell, hint::black_box};
+
+use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless_benches::Field;
+
+/// A field to mesh; sampled when it is first asked for.
+pub(crate) struct Case {
+    pub(crate) field: Field,
+    /// Samples per axis, padding included.
+    pub(crate) size: u32,
+    /// What the table says of its size.
+    pub(crate) extent: String,
+    /// The paper's milliseconds for as many cells.
+    pub(crate) paper: Option<&'static str>,
+    distances: OnceCell<Vec<f32>>,
+}
+
+impl Case {
+    pub(crate) fn new(field: Field, size: u32) -> Self {
+        Self { field, size, extent: format!("{size}³"), paper: None, distances: OnceCell::new() }
+    }
+
+    /// A terrain of `cells` per axis, padding not included.
+    pub(crate) fn whole_terrain(cells: u32, paper: &'static str) -> Self {
+        let case = Self::new(Field::Terrain, cells + 3);
+        Self { extent: format!("{cells}³ cells"), paper: Some(paper), ..case }
+    }
+
+    pub(crate) fn name(&self) -> String {
+        format!("{} {}", self.field.name(), self.extent)
+    }
+
+    /// How many times criterion looks. A round of white noise at 256³ takes seconds.
+    pub(crate) const fn sample_size(&self) -> usize {
+        if self.size < 128 { 20 } else { 10 }
+    }
+
+    /// `[size³]`, x fastest, in voxels.
+    pub(crate) fn distances(&self) -> &[f32] {
+        self.distances.get_or_init(|| self.field.distances(self.size))
+    }
+
+    /// The same as weights.
+    pub(crate) fn weights<W: Weight>(&self) -> Vec<W> {
+        self.distances().iter().map(|&distance| W::from_voxels(distance)).collect()
+    }
+
+    /// Our mesher on weights of type `W`: each call meshes them once, into warm buffers, and counts the triangles.
+    pub(crate) fn ours<W: Weight>(&self, normals: bool) -> impl FnMut() -> usize + use<W> {
+        let shape = Shape::cube(self.size).expect("the sizes are small");
+        let (weights, settings) = (self.weights::<W>(), MeshSettings { normals, ..MeshSettings::default() });
+        let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
+        move || {
+            let samples = Samples::new(shape, &weights).expect("one weight a sample").padded();
+            mesher.mesh(black_box(samples), &settings, &mut mesh).expect("there are cells to mesh");
+            black_box(&mesh).triangle_count()
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! What was measured: the least times, and the table that they make.
+//!
+//! The least of some samples, each the mean of a batch: whatever else the machine does only ever adds to a time.
+
+use core::{fmt, hint::black_box};
+use std::time::Instant;
+
+use criterion::{BenchmarkGroup, measurement::WallTime};
+use marchless::Weight;
+
+use crate::case::Case;
+
+/// Who meshes what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Subject {
+    /// Ours with normals, on weights of this name.
+    Ours(&'static str),
+    /// Ours without normals, on `f32`.
+    Bare,
+    /// fast-surface-nets on `f32`.
+    Nets,
+    /// The same, and its normals normalised.
+    NetsNormalised,
+    /// fast-surface-nets on `i8`.
+    NetsI8,
+    Isosurface,
+    Isomesh,
+    /// Nobody meshes: the weights are only read.
+    Reading(&'static str),
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ours(weight) => write!(f, "marchless {weight}"),
+            Self::Bare => f.write_str("marchless f32 without normals"),
+            Self::Nets => f.write_str("fast-surface-nets f32"),
+            Self::NetsNormalised => f.write_str("fast-surface-nets f32, normalised"),
+            Self::NetsI8 => f.write_str("fast-surface-nets i8"),
+            Self::Isosurface => f.write_str("isosurface"),
+            Self::Isomesh => f.write_str("isomesh"),
+            Self::Reading(weight) => write!(f, "reading {weight}"),
+        }
+    }
+}
+
+/// A weight that can be named, and read without meshing.
+pub(crate) trait Measured: Weight {
+    const NAME: &'static str;
+
+    /// All samples in one number.
+    fn read(weights: &[Self]) -> usize;
+}
+
+impl Measured for i8 {
+    const NAME: &'static str = "i8";
+
+    fn read(weights: &[Self]) -> usize {
+        weights.iter().fold(0, |all, weight| all ^ weight) as usize
+    }
+}
+
+impl Measured for i16 {
+    const NAME: &'static str = "i16";
+
+    fn read(weights: &[Self]) -> usize {
+        weights.iter().fold(0, |all, weight| all ^ weight) as usize
+    }
+}
+
+impl Measured for f32 {
+    const NAME: &'static str = "f32";
+
+    fn read(weights: &[Self]) -> usize {
+        weights.iter().fold(0, |all, weight| all ^ weight.to_bits()) as usize
+    }
+}
+
+/// All times of a run.
+#[derive(Default)]
+pub(crate) struct Results(Vec<Result>);
+
+struct Result {
+    /// The case's field, extent and paper.
+    case: (&'static str, String, Option<&'static str>),
+    subject: Subject,
+    seconds: f64,
+    triangles: usize,
+}
+
+impl Results {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Lets criterion time `subject`, and keeps the least time. `prepare` runs only if a filter lets the subject through; what it
+    /// makes runs once a call, and returns a number that cannot be had without the work: the triangles, of meshers.
+    pub(crate) fn measure<R: FnMut() -> usize>(
+        &mut self,
+        group: &mut BenchmarkGroup<'_, WallTime>,
+        case: &Case,
+        subject: Subject,
+        prepare: impl FnOnce() -> R,
+    ) {
+        let (mut prepare, mut run) = (Some(prepare), None);
+        let (mut times, mut triangles) = (Vec::new(), 0);
+        group.bench_function(subject.to_string(), |bencher| {
+            if let Some(prepare) = prepare.take() {
+                run = Some(prepare());
+            }
+            let Some(run) = &mut run else { return };
+            bencher.iter_custom(|iterations| {
+                let start = Instant::now();
+                for _ in 0..iterations {
+                    triangles = black_box(run());
+                }
+                let elapsed = start.elapsed();
+                times.push(elapsed.as_secs_f64() / iterations as f64);
+                elapsed
+            });
+        });
+        // Those of the warm-up came first.
+        let warm = times.len().saturating_sub(case.sample_size());
+        if let Some(seconds) = times[warm..].iter().copied().reduce(f64::min) {
+            let case = (case.field.name(), case.extent.clone(), case.paper);
+            self.0.push(Result { case, subject, seconds, triangles });
+        }
+    }
+
+    /// Both mesh the same cells of the same samples by marching cubes, so that their triangles are as many.
+    ///
+    /// # Panics
+    /// If they are not.
+    pub(crate) fn check_same_triangles(&self, case: &Case, one: Subject, other: Subject) {
+        let find = |subject| self.find(case.field.name(), &case.extent, subject).map(|result| result.triangles);
+        if let (Some(ours), Some(theirs)) = (find(one), find(other)) {
+            assert_eq!(ours, theirs, "{}: the triangles of {one} and of {other}", case.name());
+        }
+    }
+
+    fn find(&self, field: &str, extent: &str, subject: Subject) -> Option<&Result> {
+        self.0.iter().find(|result| (result.case.0, &*result.case.1, result.subject) == (field, extent, subject))
+    }
+
+    /// A row for each of ours: times, and by what factor each peer takes longer.
+    pub(crate) fn table(&self) -> String {
+        let mut rows = vec![
+            [
+                "field",
+                "samples",
+                "weight",
+                "triangles",
+                "time",
+                "Mtri/s",
+                "nets",
+                "nets, unit",
+                "isosurface",
+                "isomesh",
+                "",
+            ]
+            .map(str::to_owned),
+        ];
+        for result in &self.0 {
+            let weight = match result.subject {
+                Subject::Ours(weight) => weight,
+                Subject::Bare => "f32, no normals",
+                _ => continue,
+            };
+            let (field, extent, paper) = &result.case;
+            let factor = |subject| self.find(field, extent, subject).map(|peer| peer.seconds / result.seconds);
+            let peer = |subject| factor(subject).map_or_else(String::new, |factor| format!("{factor:.1}"));
+            let mut notes = Vec::new();
+            if let Some(factor) = factor(Subject::Reading(weight)) {
+                notes.push(format!("{:.1} times reading", 1.0 / factor));
+            }
+            if let Some(factor) = factor(Subject::NetsI8).filter(|_| weight == i8::NAME) {
+                notes.push(format!("nets on i8: {factor:.1}"));
+            }
+            if let Some(milliseconds) = paper {
+                notes.push(format!("paper: {milliseconds} ms"));
+            }
+            rows.push([
+                (*field).to_owned(),
+                extent.clone(),
+                weight.to_owned(),
+                result.triangles.to_string(),
+                duration(result.seconds),
+                format!("{:.1}", result.triangles as f64 / result.seconds / 1e6),
+                peer(Subject::Nets),
+                peer(Subject::NetsNormalised),
+                peer(Subject::Isosurface),
+                peer(Subject::Isomesh),
+                notes.join("; "),
+            ]);
+        }
+        aligned(&rows)
+    }
+}
+
+/// The middle one, or `None` of none.
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// A time with three digits or so.
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        ..1e-4 => format!("{:.1} µs", seconds * 1e6),
+        ..1e-3 => format!("{:.0} µs", seconds * 1e6),
+        ..0.1 => format!("{:.2} ms", seconds * 1e3),
+        _ => format!("{:.0} ms", seconds * 1e3),
+    }
+}
+
+/// A Markdown table whose columns are as wide as need be; the first row is its head.
+fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0).max(3);
+    let widths: [usize; N] = core::array::from_fn(width);
+    let mut table = String::new();
+    for (index, row) in rows.iter().enumerate() {
+        for (cell, &width) in row.iter().zip(&widths) {
+            table += &format!("| {cell}{} ", " ".repeat(width - cell.chars().count()));
+        }
+        table += "|\n";
+        if index == 0 {
+            for width in widths {
+                table += &format!("|{}", "-".repeat(width + 2));
+            }
+            table += "|\n";
+        }
+    }
+    table
+}
