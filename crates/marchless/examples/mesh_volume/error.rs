@@ -51,8 +51,8 @@ pub(crate) enum Error {
     #[error("{} holds samples of type {found}, but --type says {said}", path.display())]
     TypeDisagrees { path: PathBuf, found: SampleType, said: SampleType },
 
-    #[error("{} × {} × {} samples of type {sample_type} are more bytes than a file can have", size[0], size[1], size[2])]
-    TooLarge { size: [u32; 3], sample_type: SampleType },
+    #[error("{} cannot have {} × {} × {} samples of type {sample_type}, which are more bytes than any file can hold", path.display(), size[0], size[1], size[2])]
+    TooLarge { path: PathBuf, size: [u32; 3], sample_type: SampleType },
 
     #[error("{} should be {expected} bytes long ({header} of header and {} × {} × {} samples of type {sample_type}), but has {found}",
         path.display(), size[0], size[1], size[2])]

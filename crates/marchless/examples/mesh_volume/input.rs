@@ -51,7 +51,7 @@ impl Volume {
             .iter()
             .try_fold(sample_type.bytes() as u64, |bytes, &samples| bytes.checked_mul(u64::from(samples)))
             .and_then(|bytes| bytes.checked_add(header))
-            .ok_or(Error::TooLarge { size, sample_type })?;
+            .ok_or_else(|| Error::TooLarge { path: path(), size, sample_type })?;
         let found = volume.file.metadata().map_err(read)?.len();
         if found != expected {
             return Err(Error::Length { path: path(), expected, header, size, sample_type, found });

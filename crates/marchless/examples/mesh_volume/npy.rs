@@ -132,7 +132,7 @@ impl Parser<'_> {
     /// A type as NumPy writes it: byte order, kind, bytes.
     fn sample_type(&mut self) -> Result<SampleType, NpyError> {
         if self.peek() == Some(b'[') {
-            return Err(NpyError::Type { found: "[…], a record,".to_owned() });
+            return Err(NpyError::Type { found: "[…] (a record)".to_owned() });
         }
         let found = self.string("a type")?;
         let Some((order, kind)) = found.split_at_checked(1) else { return Err(NpyError::Type { found }) };

@@ -77,11 +77,10 @@ impl Glb {
         u32::try_from(length).map_err(|_| OutputError::GlbTooLong)
     }
 
-    /// The scene; empty where there is no surface.
+    /// The scene: a node with the mesh, or an empty one where there is no surface.
     fn json(&self) -> Result<Vec<u8>, OutputError> {
         let mut root = json::Root::default();
-        let mut scene =
-            json::Scene { nodes: Vec::new(), name: None, extensions: None, extras: json::Extras::default() };
+        let mut node = json::Node::default();
         if let Some([min, max]) = self.bounds {
             let (vertices, indices) = (self.vertices * VERTEX, self.triangles * TRIANGLE);
             let buffer = root.push(json::Buffer {
@@ -127,7 +126,7 @@ impl Glb {
             let positions = accessor(corners, 0, self.vertices, float, vector, Some([min, max]));
             let normals = accessor(corners, 12, self.vertices, float, vector, None);
             let indices = accessor(triangles, 0, 3 * self.triangles, ComponentType::U32, Type::Scalar, None);
-            let mesh = root.push(json::Mesh {
+            node.mesh = Some(root.push(json::Mesh {
                 primitives: vec![json::mesh::Primitive {
                     attributes: [(Valid(Positions), positions), (Valid(Normals), normals)].into(),
                     indices: Some(indices),
@@ -141,9 +140,10 @@ impl Glb {
                 name: None,
                 extensions: None,
                 extras: json::Extras::default(),
-            });
-            scene.nodes.push(root.push(json::Node { mesh: Some(mesh), ..json::Node::default() }));
+            }));
         }
+        let nodes = vec![root.push(node)];
+        let scene = json::Scene { nodes, name: None, extensions: None, extras: json::Extras::default() };
         root.scene = Some(root.push(scene));
         json::serialize::to_vec(&root).map_err(|error| OutputError::Io(error.into()))
     }

@@ -1,0 +1,82 @@
+//! Runs the example `mesh_volume`, which `cargo test` has built, in a folder of the test's own.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// A folder with volumes and what becomes of them; gone after the test.
+pub(crate) struct Folder(TempDir);
+
+impl Folder {
+    pub(crate) fn new() -> Self {
+        Self(tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("the folder of tests can be written"))
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.path(name), bytes).expect("the folder of tests can be written");
+    }
+
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// All that lies there, hidden files too.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).expect("the folder of tests can be read");
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// The example, ready to run in the folder.
+    pub(crate) fn command(&self, program: impl AsRef<OsStr>) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(self.0.path());
+        command
+    }
+
+    /// What the example makes of these arguments, split at spaces.
+    pub(crate) fn run(&self, args: &str) -> Output {
+        self.command(program()).args(args.split_whitespace()).output().expect("the example can be run")
+    }
+
+    /// Runs the example, which must succeed and say nothing that is wrong.
+    #[track_caller]
+    pub(crate) fn mesh(&self, args: &str) -> String {
+        let output = self.run(args);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && errors.is_empty(), "{args} ended with {}:\n{errors}", output.status);
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    /// Runs the example, which must refuse with one sentence that has all of `because` in it, and leave all files as they were.
+    #[track_caller]
+    pub(crate) fn assert_refused(&self, args: &str, code: i32, because: &[&str]) {
+        let before = self.names();
+        let output = self.run(args);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{args} ended with {}:\n{errors}", output.status);
+        assert!(!errors.contains("panicked"), "{args} said:\n{errors}");
+        for part in because {
+            assert!(errors.contains(part), "{args} said, without “{part}”:\n{errors}");
+        }
+        assert_eq!(self.names(), before, "{args}");
+    }
+}
+
+/// Where the example is.
+pub(crate) fn program() -> PathBuf {
+    let test = std::env::current_exe().expect("a test knows where it is");
+    let folder = test.ancestors().nth(2).expect("tests lie in a folder beside the examples'").join("examples");
+    let program = folder.join(format!("mesh_volume{}", std::env::consts::EXE_SUFFIX));
+    assert!(program.exists(), "{} is missing; `cargo test --package marchless` builds it", program.display());
+    program
+}

@@ -1,0 +1,170 @@
+//! Where the system has the say: files that replace others, a full disk, `Ctrl-C`, little memory.
+
+use crate::program::Folder;
+use crate::readers;
+use crate::volumes::Volume;
+
+#[test]
+fn no_surface_is_an_empty_mesh() {
+    let folder = Folder::new();
+    let volume = Volume::ball([6, 6, 6], "u16", 2.0, 0.0);
+    folder.write("v.raw", &volume.bytes());
+    for format in ["ply", "obj", "stl", "glb"] {
+        let output = folder.run(&format!("v.raw {} --iso 1e6 -o o.{format}", volume.flags()));
+        assert!(output.status.success());
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(said.contains("0 vertices, 0 triangles"), "{said}");
+        let note = String::from_utf8_lossy(&output.stderr);
+        assert!(note.starts_with("note: ") && note.contains("1000000"), "{note}");
+    }
+    assert!(readers::ply(&folder.read("o.ply")).positions.is_empty());
+    assert!(readers::obj(&folder.read("o.obj")).positions.is_empty());
+    assert!(readers::stl(&folder.read("o.stl")).0.is_empty());
+    assert_eq!(readers::glb(&folder.read("o.glb")), None);
+}
+
+#[test]
+fn an_old_file_is_replaced_and_the_input_stays() {
+    let folder = Folder::new();
+    let volume = Volume::ball([9, 9, 9], "u8", 3.0, 0.0);
+    folder.write("v.raw", &volume.bytes());
+    folder.write("o.ply", &[7; 1 << 20]);
+    folder.mesh(&format!("v.raw {} --iso 100 -o o.ply", volume.flags()));
+    assert!(readers::ply(&folder.read("o.ply")).report().is_closed());
+    assert_eq!(folder.read("v.raw"), volume.bytes());
+    assert_eq!(folder.names(), ["o.ply", "v.raw"]);
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::fs::File;
+    use std::os::unix::fs::{FileExt as _, PermissionsExt as _};
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+
+    use super::*;
+    use crate::program::program;
+
+    /// Runs the example below a shell's limits.
+    fn limited(folder: &Folder, limits: &str, args: &str) -> std::process::Output {
+        let line = format!("{limits}; exec \"$0\" \"$@\"");
+        let mut command = folder.command("sh");
+        command.arg("-c").arg(line).arg(program()).args(args.split_whitespace());
+        command.output().expect("there is a shell")
+    }
+
+    #[test]
+    fn others_may_read_the_mesh() {
+        let folder = Folder::new();
+        let volume = Volume::ball([9, 9, 9], "u8", 3.0, 0.0);
+        folder.write("v.raw", &volume.bytes());
+        let output = limited(&folder, "umask 022", &format!("v.raw {} --iso 100 -o o.ply", volume.flags()));
+        assert!(output.status.success());
+        let mode = folder.path("o.ply").metadata().expect("it is there").permissions().mode();
+        assert_eq!(mode & 0o777, 0o644, "{mode:o}");
+    }
+
+    #[test]
+    fn a_full_disk_leaves_nothing_behind() {
+        let folder = Folder::new();
+        let volume = Volume::ball([24, 24, 24], "u8", 9.0, 60.0);
+        folder.write("v.raw", &volume.bytes());
+        for format in ["ply", "obj", "stl", "glb"] {
+            let (name, args) = (format!("o.{format}"), format!("v.raw {} --iso 100 -o o.{format}", volume.flags()));
+            folder.mesh(&args);
+            let whole = folder.read(&name);
+            // From no room at all to all but the last 512 bytes; a program that ignores the signal is told of its full file.
+            let last = (whole.len() as u64 - 1) / 512;
+            for blocks in [0, 1, last / 4, last / 2, last * 3 / 4, last] {
+                folder.write(&name, b"old");
+                let output = limited(&folder, &format!("trap '' XFSZ; ulimit -f {blocks}"), &args);
+                let errors = String::from_utf8_lossy(&output.stderr);
+                assert_eq!(output.status.code(), Some(1), "{format}, {blocks} blocks: {errors}");
+                assert!(errors.contains(&format!("{name} cannot be written: ")), "{errors}");
+                assert_eq!(folder.read(&name), b"old");
+                assert!(folder.names().iter().all(|name| name.starts_with(['o', 'v'])), "{:?}", folder.names());
+            }
+        }
+    }
+
+    #[test]
+    fn an_interruption_leaves_nothing_behind() {
+        let folder = Folder::new();
+        // As long as many seconds of work, and nearly empty on the disk.
+        let file = File::create(folder.path("v.raw")).expect("the folder of tests can be written");
+        file.set_len(1 << 37).expect("files may have holes");
+        for signal in ["INT", "TERM"] {
+            let mut command = folder.command(program());
+            command.args("v.raw --shape 2048,2048,32768 --type u8 --iso 1 -o o.ply".split(' '));
+            let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+            let since = Instant::now();
+            while folder.names().len() < 2 {
+                assert!(since.elapsed() < Duration::from_secs(60), "it has not begun");
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            std::thread::sleep(Duration::from_millis(100));
+            let killed = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status();
+            assert!(killed.is_ok_and(|status| status.success()));
+            let output = child.wait_with_output().expect("it ends");
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(130), "{errors}");
+            assert!(errors.contains("interrupted"), "{errors}");
+            assert_eq!(folder.names(), ["v.raw"]);
+        }
+    }
+
+    /// A file of `size`³ bytes, all 255 but for a ball, and with holes where they are 0 outside of it.
+    fn sparse_ball(folder: &Folder, size: u64, radius: i64) {
+        let file = File::create(folder.path("v.raw")).expect("the folder of tests can be written");
+        file.set_len(size * size * size).expect("files may have holes");
+        let middle = size as i64 / 2;
+        for z in -radius..=radius {
+            for y in -radius..=radius {
+                let row: Vec<u8> = (-radius..=radius)
+                    .map(|x| {
+                        let distance = ((x * x + y * y + z * z) as f64).sqrt();
+                        (128.0 + 30.0 * (radius as f64 - 2.0 - distance)).clamp(0.0, 255.0) as u8
+                    })
+                    .collect();
+                let at = (middle - radius) as u64 + size * ((middle + y) as u64 + size * (middle + z) as u64);
+                file.write_all_at(&row, at).expect("there is room for the ball");
+            }
+        }
+    }
+
+    /// Meshes such a ball in a process that can have no more than `mebibytes` of addresses.
+    #[cfg(target_os = "linux")]
+    fn mesh_in(mebibytes: u64, size: u64, radius: i64) {
+        let folder = Folder::new();
+        sparse_ball(&folder, size, radius);
+        for format in ["ply", "stl", "glb"] {
+            let args = format!("v.raw --shape {size},{size},{size} --type u8 --iso 128 --invert -o o.{format}");
+            let output = limited(&folder, &format!("ulimit -v {}", 1024 * mebibytes), &args);
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{}: {errors}", output.status);
+            println!("{}", String::from_utf8_lossy(&output.stdout));
+        }
+        let (facets, _) = readers::stl(&folder.read("o.stl"));
+        let mesh = readers::ply(&folder.read("o.ply"));
+        let report = mesh.report();
+        assert!(report.is_closed() && report.is_clean() && report.euler == 2, "{report}");
+        assert!(facets == mesh.corners());
+        assert_eq!(readers::glb(&folder.read("o.glb")), Some(mesh.clone()));
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * (radius as f64 - 2.0).powi(3);
+        assert!((mesh.volume() / exact - 1.0).abs() < 0.02, "{} of {exact}", mesh.volume());
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    #[ignore = "waits for the mesher that is fed slab by slab"]
+    fn a_volume_may_be_larger_than_memory() {
+        mesh_in(64, 512, 20);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    #[ignore = "reads 24 GiB of holes: cargo test --release --package marchless -- --ignored gibibyte"]
+    fn a_volume_of_8_gib_needs_less_than_a_gibibyte() {
+        mesh_in(1024, 2048, 100);
+    }
+}
