@@ -61,13 +61,21 @@ fn uniform<S: Simd, W: Weight>(plane: &[W], threshold: W::Threshold) -> Option<b
     let expected = if inside { u32::MAX } else { 0 };
     let (groups, rest) = plane.as_chunks::<128>();
     for group in groups {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|quarter| {
-            let weights: &[W; 32] = group[32 * quarter..].first_chunk().expect("128 hold four times 32");
-            W::below::<S>(weights, threshold) ^ expected
-        });
-        if a | b | c | d != 0 {
+        let mut others = 0;
+        for weights in group.as_chunks::<32>().0 {
+            others |= W::below::<S>(weights, threshold) ^ expected;
+        }
+        if others != 0 {
             return None;
         }
+    }
+    // The last of them once more where they are not whole groups of 32.
+    if let Some(last) = plane.last_chunk::<32>() {
+        let mut others = W::below::<S>(last, threshold) ^ expected;
+        for weights in rest.as_chunks::<32>().0 {
+            others |= W::below::<S>(weights, threshold) ^ expected;
+        }
+        return (others == 0).then_some(inside);
     }
     rest.iter().all(|weight| weight.inside(threshold) == inside).then_some(inside)
 }

@@ -20,6 +20,8 @@ pub(super) struct Lattice {
     pub(super) size: [usize; 3],
     /// Whether there is a layer of padding around them.
     pub(super) padded: bool,
+    /// The samples of a slab, padding included.
+    pub(super) len: usize,
     /// The index of the slab's first meshed sample.
     pub(super) origin: usize,
     /// How far apart in memory neighbours along y are.
@@ -42,6 +44,7 @@ impl Lattice {
         Ok(Self {
             size,
             padded: samples.is_padded(),
+            len: shape.strides()[2],
             origin: padding as usize * (1 + stride),
             stride,
             words: size[0].div_ceil(64),
@@ -78,31 +81,41 @@ impl Lattice {
         (row[word] ^ shifted(row, word)) & self.x_edges(word)
     }
 
-    /// Twice the gradient at the sample at `x`, `y` with index `at`, from its slab and those `below` and `above` it.
+    /// Twice the gradient at the meshed sample at `x`, `y` with index `index`, from its slab and those `below` and `above` it.
+    ///
+    /// # Safety
+    /// `x` and `y` are less than the size, and the slabs are whole.
+    #[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
     #[inline(always)]
-    pub(super) fn gradient<W: Weight, const PADDED: bool>(
+    pub(super) unsafe fn gradient<W: Weight, const PADDED: bool>(
         &self,
         [below, slab, above]: [&[W]; 3],
         one_sided_z: bool,
-        at: usize,
+        index: usize,
         x: u32,
         y: u32,
     ) -> [W::Wide; 3] {
+        let ([low, high], one_sided) = if PADDED {
+            ([[index - 1, index - self.stride], [index + 1, index + self.stride]], [false; 2])
+        } else {
+            self.neighbours(index, x, y)
+        };
+        // SAFETY: the sample's neighbours are in the slab, too, or it stands in for them.
+        let [dx, dy, dz] = unsafe {
+            [
+                W::difference(at(slab, high[0]), at(slab, low[0])),
+                W::difference(at(slab, high[1]), at(slab, low[1])),
+                W::difference(at(above, index), at(below, index)),
+            ]
+        };
         if PADDED {
-            return [
-                W::difference(slab[at + 1], slab[at - 1]),
-                W::difference(slab[at + self.stride], slab[at - self.stride]),
-                W::difference(above[at], below[at]),
-            ];
+            return [dx, dy, dz];
         }
-        let ([low, high], one_sided) = self.neighbours(at, x, y);
-        let differences = [
-            W::difference(slab[high[0]], slab[low[0]]),
-            W::difference(slab[high[1]], slab[low[1]]),
-            W::difference(above[at], below[at]),
-        ];
-        let one_sided = [one_sided[0], one_sided[1], one_sided_z];
-        core::array::from_fn(|k| if one_sided[k] { W::doubled(differences[k]) } else { differences[k] })
+        [
+            if one_sided[0] { W::doubled(dx) } else { dx },
+            if one_sided[1] { W::doubled(dy) } else { dy },
+            if one_sided_z { W::doubled(dz) } else { dz },
+        ]
     }
 
     /// The same, where differences may overflow.
@@ -133,6 +146,18 @@ impl Lattice {
         let high = [at + usize::from(!last[0]), at + if last[1] { 0 } else { self.stride }];
         ([low, high], [first[0] | last[0], first[1] | last[1]])
     }
+}
+
+/// The sample of a slab at `index`.
+///
+/// # Safety
+/// `index` is less than the slab's length.
+#[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
+#[inline(always)]
+pub(super) unsafe fn at<W: Copy>(slab: &[W], index: usize) -> W {
+    debug_assert!(index < slab.len());
+    // SAFETY: as the caller promises.
+    unsafe { *slab.get_unchecked(index) }
 }
 
 /// The word of +x neighbours of `row[word]`.

@@ -8,7 +8,7 @@ use core::mem::MaybeUninit;
 use super::{
     MeshSettings,
     output::{Bounds, keep, room},
-    slabs::Lattice,
+    slabs::{Lattice, at},
 };
 use crate::{
     buffer::MeshBuffer,
@@ -158,24 +158,31 @@ impl<W: Weight> Vertices<W> {
         count: usize,
     ) {
         let [below, low, high, above] = planes.slabs;
+        assert!(planes.slabs.iter().all(|slab| slab.len() == lattice.len), "all slabs are whole");
+        // Along z an end's neighbours lie in other slabs.
+        let (next_to_low, next_to_high) = if AXIS == 2 { (high, low) } else { (above, below) };
+        let [one_sided_low, one_sided_high] = planes.one_sided;
+        let (xs, ys) = (&self.x[..count], &self.y[..count]);
+        let [low_ends, high_ends] = &mut self.ends;
+        let (low_ends, high_ends) = (&mut low_ends[..count], &mut high_ends[..count]);
+        let [[ax, ay, az], [bx, by, bz]] = &mut self.gradients;
+        let (ax, ay, az) = (&mut ax[..count], &mut ay[..count], &mut az[..count]);
+        let (bx, by, bz) = (&mut bx[..count], &mut by[..count], &mut bz[..count]);
         for i in 0..count {
-            let (x, y) = (self.x[i], self.y[i]);
+            let (x, y) = (xs[i], ys[i]);
             let a = lattice.index(x, y);
             let b = a + lattice.step::<AXIS>();
-            self.ends[0][i] = low[a].wide();
-            self.ends[1][i] = high[b].wide();
-            if settings.normals {
-                let (xb, yb) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
-                // Along z an end's neighbours lie in other slabs.
-                let (next_to_low, next_to_high) = if AXIS == 2 { (high, low) } else { (above, below) };
-                let gradients = [
-                    lattice.gradient::<W, PADDED>([below, low, next_to_low], planes.one_sided[0], a, x, y),
-                    lattice.gradient::<W, PADDED>([next_to_high, high, above], planes.one_sided[1], b, xb, yb),
-                ];
-                for (end, gradient) in gradients.into_iter().enumerate() {
-                    for (axis, difference) in gradient.into_iter().enumerate() {
-                        self.gradients[end][axis][i] = difference;
-                    }
+            let (xb, yb) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
+            // SAFETY: the slabs are whole, and both ends of a crossing are meshed samples.
+            #[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
+            unsafe {
+                low_ends[i] = at(low, a).wide();
+                high_ends[i] = at(high, b).wide();
+                if settings.normals {
+                    [ax[i], ay[i], az[i]] =
+                        lattice.gradient::<W, PADDED>([below, low, next_to_low], one_sided_low, a, x, y);
+                    [bx[i], by[i], bz[i]] =
+                        lattice.gradient::<W, PADDED>([next_to_high, high, above], one_sided_high, b, xb, yb);
                 }
             }
         }
@@ -193,15 +200,16 @@ impl<W: Weight> Vertices<W> {
         normals: &mut [MaybeUninit<[f32; 3]>],
     ) -> bool {
         let z = z as f32;
-        let mut unsound = 0u32;
-        let Bounds { mut min, mut max } = self.bounds;
         let room = positions.len();
-        let [a, b] = [&self.ends[0][..room], &self.ends[1][..room]];
-        let [xs, ys] = [&self.x[..room], &self.y[..room]];
-        let slopes = [0, 1].map(|end| [0, 1, 2].map(|axis| &self.gradients[end][axis][..room]));
+        let (a, b, xs, ys) = (&self.ends[0][..room], &self.ends[1][..room], &self.x[..room], &self.y[..room]);
+        let [ax, ay, az] = &self.gradients[0];
+        let [bx, by, bz] = &self.gradients[1];
+        let (ax, ay, az, bx, by, bz) = (&ax[..room], &ay[..room], &az[..room], &bx[..room], &by[..room], &bz[..room]);
         if NORMALS {
             assert_eq!(normals.len(), room);
         }
+        let Bounds { mut min, mut max } = self.bounds;
+        let mut unsound = false;
         for i in 0..room {
             let within = i < count;
             let (fraction, mut sound) = W::quick_fraction(a[i], b[i], isovalue);
@@ -210,23 +218,25 @@ impl<W: Weight> Vertices<W> {
             position[AXIS] += fraction;
             positions[i].write(position);
             // Positions are not negative, so that their bits are in the same order.
-            for axis in 0..3 {
+            let mut axis = 0;
+            while axis < 3 {
                 let bits = position[axis].to_bits();
                 min[axis] = min[axis].min(if within { bits } else { u32::MAX });
                 max[axis] = max[axis].max(if within { bits } else { 0 });
+                axis += 1;
             }
             if NORMALS {
-                let [x, y, z] = [0, 1, 2].map(|axis| {
-                    let [low, high] = slopes.map(|slope| W::to_f32(slope[axis][i]));
-                    low + (high - low) * fraction
-                });
+                let x = mixed::<W>(ax[i], bx[i], fraction);
+                let y = mixed::<W>(ay[i], by[i], fraction);
+                let z = mixed::<W>(az[i], bz[i], fraction);
                 let squared = x * x + y * y + z * z;
                 sound &= is_sound(squared);
                 let scale = 1.0 / sqrt(squared);
                 normals[i].write([x * scale, y * scale, z * scale]);
             }
-            unsound |= u32::from(within & !sound);
+            unsound |= within & !sound;
         }
+        let unsound = u32::from(unsound);
         if unsound == 0 {
             self.bounds = Bounds { min, max };
         }
@@ -257,10 +267,8 @@ impl<W: Weight> Vertices<W> {
             room(&mut out.positions, count)[i].write(position);
             self.bounds.include(position);
             if settings.normals {
-                let gradient = [0, 1, 2].map(|axis| {
-                    let [low, high] = [0, 1].map(|end| W::to_f32(self.gradients[end][axis][i]));
-                    low + (high - low) * fraction
-                });
+                let [ga, gb] = &self.gradients;
+                let gradient = [0, 1, 2].map(|axis| mixed::<W>(ga[axis][i], gb[axis][i], fraction));
                 let normal = unit(gradient).unwrap_or_else(|| {
                     let ends = [
                         lattice.steady_gradient([below, low, next_to_low], planes.one_sided[0], a, x, y),
@@ -287,6 +295,12 @@ pub(crate) fn crossing_fraction<W: Weight>(a: W, b: W, isovalue: f32) -> f32 {
 fn clamped(fraction: f32) -> f32 {
     let fraction = if fraction > MARGIN { fraction } else { MARGIN };
     if fraction < 1.0 - MARGIN { fraction } else { 1.0 - MARGIN }
+}
+
+#[inline(always)]
+fn mixed<W: Weight>(a: W::Wide, b: W::Wide, fraction: f32) -> f32 {
+    let (a, b) = (W::to_f32(a), W::to_f32(b));
+    a + (b - a) * fraction
 }
 
 /// Whether `f32` computes well with a gradient whose squared length this is.

@@ -25,38 +25,20 @@ pub(super) struct Avx2;
 impl Simd for Avx2 {
     #[inline(always)]
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
-        // SAFETY: within `run`; the load is all of the 32 weights.
-        unsafe {
-            let weights = _mm256_loadu_si256(weights.as_ptr().cast());
-            _mm256_movemask_epi8(_mm256_cmpgt_epi8(_mm256_set1_epi8(threshold), weights)) as u32
-        }
+        // SAFETY: within `run`.
+        unsafe { below_i8(weights, threshold) }
     }
 
     #[inline(always)]
     fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
-        // SAFETY: within `run`; both loads lie within the 32 weights.
-        unsafe {
-            let threshold = _mm256_set1_epi16(threshold);
-            let load = |index: usize| _mm256_loadu_si256(weights.as_ptr().add(16 * index).cast());
-            let below = |index| _mm256_cmpgt_epi16(threshold, load(index));
-            // Packing goes by halves of 128 bits; the permutation puts them back in order.
-            let packed = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(below(0), below(1)));
-            _mm256_movemask_epi8(packed) as u32
-        }
+        // SAFETY: within `run`.
+        unsafe { below_i16(weights, threshold) }
     }
 
     #[inline(always)]
     fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
-        // SAFETY: within `run`; all loads lie within the 32 weights.
-        unsafe {
-            let threshold = _mm256_set1_ps(threshold);
-            let load = |index: usize| _mm256_loadu_ps(weights.as_ptr().add(8 * index));
-            let below = |index| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(load(index), threshold));
-            let halves = [_mm256_packs_epi32(below(0), below(1)), _mm256_packs_epi32(below(2), below(3))];
-            let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
-            let packed = _mm256_permutevar8x32_epi32(_mm256_packs_epi16(halves[0], halves[1]), order);
-            _mm256_movemask_epi8(packed) as u32
-        }
+        // SAFETY: within `run`.
+        unsafe { below_f32(weights, threshold) }
     }
 
     #[inline(always)]
@@ -65,62 +47,112 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
-        let count = active.count_ones() as usize;
-        let mut dense = [0u8; 64];
-        // SAFETY: within `run`; each store is one half of the 64 bytes.
-        unsafe {
-            let spread = _mm256_setr_epi64x(0, 0x0101_0101_0101_0101, 0x0202_0202_0202_0202, 0x0303_0303_0303_0303);
-            let bit = _mm256_set1_epi64x(0x8040_2010_0804_0201u64 as i64);
-            for half in 0..2 {
-                if active >> (32 * half) as u32 == 0 {
-                    continue;
-                }
-                let mut bytes = _mm256_setzero_si256();
-                for (corner, signs) in corners.iter().enumerate() {
-                    let signs = _mm256_shuffle_epi8(_mm256_set1_epi32((signs >> (32 * half)) as i32), spread);
-                    let set = _mm256_cmpeq_epi8(_mm256_and_si256(signs, bit), bit);
-                    bytes = _mm256_or_si256(bytes, _mm256_and_si256(set, _mm256_set1_epi8((1u8 << corner) as i8)));
-                }
-                _mm256_storeu_si256(dense.as_mut_ptr().add(32 * half).cast(), bytes);
-            }
-        }
-        for case in cases {
-            if active == 0 {
-                break;
-            }
-            *case = u16::from(dense[active.trailing_zeros() as usize % 64]);
-            active &= active - 1;
-        }
-        count
+    fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
+        // SAFETY: within `run`.
+        unsafe { self::cases(corners, active, cases) }
     }
 
     #[inline(always)]
     fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
-        assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
-        let mut end = 0;
-        // SAFETY: within `run`; a code is below `CODES`, and `end` grows by 15 a code at most, so that the 16 indices from it on
-        // lie within what was asserted.
-        unsafe {
-            let mut running = _mm256_loadu_si256(counters.as_ptr().cast());
-            for &code in codes {
-                let code = usize::from(code) % CODES;
-                let row = tables.vertices[code].as_ptr();
-                for half in 0..2 {
-                    let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(row.add(8 * half).cast()));
-                    // The permutation looks at bits 0 to 2 only.
-                    let indices_of_half = _mm256_add_epi32(
-                        _mm256_permutevar8x32_epi32(running, vertices),
-                        _mm256_srli_epi32::<4>(vertices),
-                    );
-                    _mm256_storeu_si256(indices.as_mut_ptr().add(end + 8 * half).cast(), indices_of_half);
-                }
-                let steps = _mm256_cvtepu8_epi32(_mm_loadl_epi64(tables.steps[code].as_ptr().cast()));
-                running = _mm256_add_epi32(running, steps);
-                end += usize::from(tables.counts[code]);
-            }
-            _mm256_storeu_si256(counters.as_mut_ptr().cast(), running);
-        }
-        end
+        // SAFETY: within `run`.
+        unsafe { self::triangles(tables, codes, counters, indices) }
     }
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
+    // SAFETY: the load is all of the 32 weights.
+    let weights = unsafe { _mm256_loadu_si256(weights.as_ptr().cast()) };
+    _mm256_movemask_epi8(_mm256_cmpgt_epi8(_mm256_set1_epi8(threshold), weights)) as u32
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
+    let threshold = _mm256_set1_epi16(threshold);
+    let below = |half: &[i16]| {
+        debug_assert_eq!(half.len(), 16);
+        // SAFETY: the load is all of the 16 weights.
+        _mm256_cmpgt_epi16(threshold, unsafe { _mm256_loadu_si256(half.as_ptr().cast()) })
+    };
+    // Packing goes by halves of 128 bits; the permutation puts them back in order.
+    let packed = _mm256_packs_epi16(below(&weights[..16]), below(&weights[16..]));
+    _mm256_movemask_epi8(_mm256_permute4x64_epi64::<0b11_01_10_00>(packed)) as u32
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
+    let threshold = _mm256_set1_ps(threshold);
+    let below = |quarter: &[f32]| {
+        debug_assert_eq!(quarter.len(), 8);
+        // SAFETY: the load is all of the 8 weights.
+        _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(unsafe { _mm256_loadu_ps(quarter.as_ptr()) }, threshold))
+    };
+    let low = _mm256_packs_epi32(below(&weights[..8]), below(&weights[8..16]));
+    let high = _mm256_packs_epi32(below(&weights[16..24]), below(&weights[24..]));
+    let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+    _mm256_movemask_epi8(_mm256_permutevar8x32_epi32(_mm256_packs_epi16(low, high), order)) as u32
+}
+
+#[inline]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
+    let count = active.count_ones() as usize;
+    let mut dense = [0u8; 64];
+    // Each byte of a half gets the byte that its bit lies in, and keeps the bit.
+    let [a, b, c, d] = [0, 1, 2, 3].map(|byte| byte * 0x0101_0101_0101_0101);
+    let (spread, bit) = (_mm256_setr_epi64x(a, b, c, d), _mm256_set1_epi64x(0x8040_2010_0804_0201u64 as i64));
+    for (half, dense) in dense.as_chunks_mut::<32>().0.iter_mut().enumerate() {
+        if active >> (32 * half) as u32 == 0 {
+            continue;
+        }
+        let mut bytes = _mm256_setzero_si256();
+        for (corner, signs) in corners.into_iter().enumerate() {
+            let signs = _mm256_shuffle_epi8(_mm256_set1_epi32((signs >> (32 * half)) as i32), spread);
+            let set = _mm256_cmpeq_epi8(_mm256_and_si256(signs, bit), bit);
+            bytes = _mm256_or_si256(bytes, _mm256_and_si256(set, _mm256_set1_epi8((1u8 << corner) as i8)));
+        }
+        // SAFETY: the store is all of the 32 bytes.
+        unsafe { _mm256_storeu_si256(dense.as_mut_ptr().cast(), bytes) }
+    }
+    for case in cases {
+        if active == 0 {
+            break;
+        }
+        *case = u16::from(dense[active.trailing_zeros() as usize % 64]);
+        active &= active - 1;
+    }
+    count
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+    assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
+    let mut end = 0;
+    // SAFETY: the load is all of the counters.
+    let mut running = unsafe { _mm256_loadu_si256(counters.as_ptr().cast()) };
+    for &code in codes {
+        let code = usize::from(code) % CODES;
+        let (row, steps) = (tables.vertices[code].as_ptr(), tables.steps[code].as_ptr());
+        for half in [0, 8] {
+            // SAFETY: the load is half of the row. `end` grows by 15 a code at most, so that the 16 indices from it on lie within
+            // what was asserted.
+            unsafe {
+                let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(row.add(half).cast()));
+                // The permutation looks at bits 0 to 2 only.
+                let first = _mm256_permutevar8x32_epi32(running, vertices);
+                let indices_of_half = _mm256_add_epi32(first, _mm256_srli_epi32::<4>(vertices));
+                _mm256_storeu_si256(indices.as_mut_ptr().add(end + half).cast(), indices_of_half);
+            }
+        }
+        // SAFETY: the load is all of the eight steps.
+        running = _mm256_add_epi32(running, _mm256_cvtepu8_epi32(unsafe { _mm_loadl_epi64(steps.cast()) }));
+        end += usize::from(tables.counts[code]);
+    }
+    // SAFETY: the store is all of the counters.
+    unsafe { _mm256_storeu_si256(counters.as_mut_ptr().cast(), running) }
+    end
 }

@@ -22,6 +22,44 @@ pub(super) unsafe fn run<J: Job>(job: J) -> J::Output {
 /// Used within [`run`] alone, so that the instructions are there.
 pub(super) struct Avx512;
 
+impl Simd for Avx512 {
+    #[inline(always)]
+    fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
+        // SAFETY: within `run`.
+        unsafe { below_i8(weights, threshold) }
+    }
+
+    #[inline(always)]
+    fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
+        // SAFETY: within `run`.
+        unsafe { below_i16(weights, threshold) }
+    }
+
+    #[inline(always)]
+    fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
+        // SAFETY: within `run`.
+        unsafe { below_f32(weights, threshold) }
+    }
+
+    #[inline(always)]
+    fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
+        // SAFETY: within `run`.
+        unsafe { self::positions(word, base, row, positions, rows) }
+    }
+
+    #[inline(always)]
+    fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
+        // SAFETY: within `run`.
+        unsafe { self::cases(corners, active, cases) }
+    }
+
+    #[inline(always)]
+    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+        // SAFETY: within `run`.
+        unsafe { self::triangles(tables, codes, counters, indices) }
+    }
+}
+
 /// The bytes 0 to 63.
 static COUNTING: [u8; 64] = {
     let (mut bytes, mut index) = ([0; 64], 0);
@@ -32,95 +70,103 @@ static COUNTING: [u8; 64] = {
     bytes
 };
 
-impl Simd for Avx512 {
-    #[inline(always)]
-    fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
-        // SAFETY: within `run`; the load is all of the 32 weights.
-        unsafe { _mm256_cmplt_epi8_mask(_mm256_loadu_si256(weights.as_ptr().cast()), _mm256_set1_epi8(threshold)) }
-    }
+#[inline]
+#[target_feature(enable = "avx512bw,avx512vl")]
+fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
+    // SAFETY: the load is all of the 32 weights.
+    let weights = unsafe { _mm256_loadu_si256(weights.as_ptr().cast()) };
+    _mm256_cmplt_epi8_mask(weights, _mm256_set1_epi8(threshold))
+}
 
-    #[inline(always)]
-    fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
-        // SAFETY: within `run`; the load is all of the 32 weights.
-        unsafe { _mm512_cmplt_epi16_mask(_mm512_loadu_si512(weights.as_ptr().cast()), _mm512_set1_epi16(threshold)) }
-    }
+#[inline]
+#[target_feature(enable = "avx512bw")]
+fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
+    // SAFETY: the load is all of the 32 weights.
+    let weights = unsafe { _mm512_loadu_si512(weights.as_ptr().cast()) };
+    _mm512_cmplt_epi16_mask(weights, _mm512_set1_epi16(threshold))
+}
 
-    #[inline(always)]
-    fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
-        // SAFETY: within `run`; both loads lie within the 32 weights.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
+    let threshold = _mm512_set1_ps(threshold);
+    let below = |half: &[f32]| {
+        debug_assert_eq!(half.len(), 16);
+        // SAFETY: the load is all of the 16 weights.
+        u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(unsafe { _mm512_loadu_ps(half.as_ptr()) }, threshold))
+    };
+    below(&weights[..16]) | below(&weights[16..]) << 16
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,popcnt")]
+fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
+    let count = word.count_ones() as usize;
+    // SAFETY: the load is all of the 64 bytes.
+    let bits = _mm512_maskz_compress_epi8(word, unsafe { _mm512_loadu_si512(COUNTING.as_ptr().cast()) });
+    let (base, row) = (_mm512_set1_epi32(base as i32), _mm512_set1_epi32(row as i32));
+    let mut store = |quarter: usize, bits: __m128i| {
+        let quarter_of_positions = _mm512_add_epi32(base, _mm512_cvtepu8_epi32(bits));
+        // SAFETY: each store is one quarter of the 64 positions or rows.
         unsafe {
-            let threshold = _mm512_set1_ps(threshold);
-            let load = |index: usize| _mm512_loadu_ps(weights.as_ptr().add(16 * index));
-            let half = |index| u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(load(index), threshold));
-            half(0) | half(1) << 16
+            _mm512_storeu_si512(positions[16 * quarter..].as_mut_ptr().cast(), quarter_of_positions);
+            _mm512_storeu_si512(rows[16 * quarter..].as_mut_ptr().cast(), row);
         }
+    };
+    store(0, _mm512_castsi512_si128(bits));
+    if count > 16 {
+        store(1, _mm512_extracti32x4_epi32::<1>(bits));
     }
+    if count > 32 {
+        store(2, _mm512_extracti32x4_epi32::<2>(bits));
+        store(3, _mm512_extracti32x4_epi32::<3>(bits));
+    }
+    count
+}
 
-    #[inline(always)]
-    fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
-        let count = word.count_ones() as usize;
-        // SAFETY: within `run`; the load is all of the 64 bytes, and each store one quarter of the 64 positions or rows.
-        unsafe {
-            let bits = _mm512_maskz_compress_epi8(word, _mm512_loadu_si512(COUNTING.as_ptr().cast()));
-            let (base, row) = (_mm512_set1_epi32(base as i32), _mm512_set1_epi32(row as i32));
-            let mut store = |quarter: usize, bits: __m128i| {
-                let quarter_positions = _mm512_add_epi32(base, _mm512_cvtepu8_epi32(bits));
-                _mm512_storeu_si512(positions.as_mut_ptr().add(16 * quarter).cast(), quarter_positions);
-                _mm512_storeu_si512(rows.as_mut_ptr().add(16 * quarter).cast(), row);
-            };
-            store(0, _mm512_castsi512_si128(bits));
-            if count > 16 {
-                store(1, _mm512_extracti32x4_epi32::<1>(bits));
-            }
-            if count > 32 {
-                store(2, _mm512_extracti32x4_epi32::<2>(bits));
-                store(3, _mm512_extracti32x4_epi32::<3>(bits));
-            }
-        }
-        count
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vbmi2,popcnt")]
+fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
+    let count = active.count_ones() as usize;
+    let mut bytes = _mm512_setzero_si512();
+    for (corner, signs) in corners.into_iter().enumerate() {
+        bytes = _mm512_mask_add_epi8(bytes, signs, bytes, _mm512_set1_epi8((1u8 << corner) as i8));
     }
+    let bytes = _mm512_maskz_compress_epi8(active, bytes);
+    let low = _mm512_cvtepu8_epi16(_mm512_castsi512_si256(bytes));
+    // SAFETY: the store is one half of the 64 cases.
+    unsafe { _mm512_storeu_si512(cases[..32].as_mut_ptr().cast(), low) }
+    if count > 32 {
+        let high = _mm512_cvtepu8_epi16(_mm512_extracti64x4_epi64::<1>(bytes));
+        // SAFETY: the store is the other half.
+        unsafe { _mm512_storeu_si512(cases[32..].as_mut_ptr().cast(), high) }
+    }
+    count
+}
 
-    #[inline(always)]
-    fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
-        let count = active.count_ones() as usize;
-        // SAFETY: within `run`; each store is one half of the 64 cases.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+    assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
+    let mut end = 0;
+    // The counters twice, so that bit 3 of a lane's number makes no difference.
+    // SAFETY: the load is all of the counters.
+    let mut running = _mm512_broadcast_i64x4(unsafe { _mm256_loadu_si256(counters.as_ptr().cast()) });
+    for &code in codes {
+        let code = usize::from(code) % CODES;
+        // SAFETY: the loads are all of the row and all of the eight steps. `end` grows by 15 a code at most, so that the 16 indices
+        // from it on lie within what was asserted.
         unsafe {
-            let mut bytes = _mm512_setzero_si512();
-            for (corner, signs) in corners.into_iter().enumerate() {
-                bytes = _mm512_mask_add_epi8(bytes, signs, bytes, _mm512_set1_epi8((1u8 << corner) as i8));
-            }
-            let bytes = _mm512_maskz_compress_epi8(active, bytes);
-            let low = _mm512_cvtepu8_epi16(_mm512_castsi512_si256(bytes));
-            _mm512_storeu_si512(cases.as_mut_ptr().cast(), low);
-            if count > 32 {
-                let high = _mm512_cvtepu8_epi16(_mm512_extracti64x4_epi64::<1>(bytes));
-                _mm512_storeu_si512(cases.as_mut_ptr().add(32).cast(), high);
-            }
+            let vertices = _mm512_cvtepu8_epi32(_mm_loadu_si128(tables.vertices[code].as_ptr().cast()));
+            let first = _mm512_permutexvar_epi32(vertices, running);
+            let indices_of_cell = _mm512_add_epi32(first, _mm512_srli_epi32::<4>(vertices));
+            _mm512_storeu_si512(indices.as_mut_ptr().add(end).cast(), indices_of_cell);
+            let steps = _mm_loadl_epi64(tables.steps[code].as_ptr().cast());
+            running = _mm512_add_epi32(running, _mm512_cvtepu8_epi32(_mm_unpacklo_epi64(steps, steps)));
         }
-        count
+        end += usize::from(tables.counts[code]);
     }
-
-    #[inline(always)]
-    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
-        assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
-        let mut end = 0;
-        // SAFETY: within `run`; a code is below `CODES`, and `end` grows by 15 a code at most, so that the 16 indices from it on
-        // lie within what was asserted.
-        unsafe {
-            // The counters twice, so that bit 3 of a lane's number makes no difference.
-            let mut running = _mm512_broadcast_i64x4(_mm256_loadu_si256(counters.as_ptr().cast()));
-            for &code in codes {
-                let code = usize::from(code) % CODES;
-                let vertices = _mm512_cvtepu8_epi32(_mm_loadu_si128(tables.vertices[code].as_ptr().cast()));
-                let indices_of_cell =
-                    _mm512_add_epi32(_mm512_permutexvar_epi32(vertices, running), _mm512_srli_epi32::<4>(vertices));
-                _mm512_storeu_si512(indices.as_mut_ptr().add(end).cast(), indices_of_cell);
-                let steps = _mm_loadl_epi64(tables.steps[code].as_ptr().cast());
-                running = _mm512_add_epi32(running, _mm512_cvtepu8_epi32(_mm_unpacklo_epi64(steps, steps)));
-                end += usize::from(tables.counts[code]);
-            }
-            _mm256_storeu_si256(counters.as_mut_ptr().cast(), _mm512_castsi512_si256(running));
-        }
-        end
-    }
+    // SAFETY: the store is all of the counters.
+    unsafe { _mm256_storeu_si256(counters.as_mut_ptr().cast(), _mm512_castsi512_si256(running)) }
+    end
 }
