@@ -117,7 +117,7 @@ real_sample!(f32);
 real_sample!(f64);
 
 /// How far the sample lies above the isovalue, rounded such that it is negative exactly where the sample lies below.
-/// (Differences that are too small for an `f32` all count as its smallest.)
+/// (Differences that are too small for an `f32` become zero, or its smallest number below.)
 #[inline(always)]
 fn above(sample: f64, iso: f64) -> f32 {
     const LEAST: f32 = f32::from_bits(1);

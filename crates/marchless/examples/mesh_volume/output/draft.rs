@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read as _, Seek as _, Write};
 use std::path::Path;
 
-use tempfile::{Builder, NamedTempFile};
+use tempfile::{Builder, TempPath};
 
 use crate::args::folder;
 
@@ -15,10 +15,12 @@ const PIECE: u64 = 1 << 24;
 
 /// A file in the making, in the folder where it is to be. Dropped before its end, it leaves nothing there.
 pub(super) struct Draft {
-    /// The file itself, under another name: the header and the body.
-    body: BufWriter<NamedTempFile>,
+    /// The header and the body.
+    body: BufWriter<File>,
     /// What comes behind the body; a file without a name.
     tail: BufWriter<File>,
+    /// The name of the first file until it is whole. Last, so that it is closed before it is removed.
+    name: TempPath,
 }
 
 impl Draft {
@@ -30,10 +32,11 @@ impl Draft {
         // Temporary files are otherwise for their owner's eyes only, and so would the mesh be.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut body = BufWriter::with_capacity(BUFFER, builder.tempfile_in(folder)?);
+        let (file, name) = builder.tempfile_in(folder)?.into_parts();
+        let mut body = BufWriter::with_capacity(BUFFER, file);
         let tail = BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?);
         body.write_all(&vec![0; header])?;
-        Ok(Self { body, tail })
+        Ok(Self { body, tail, name })
     }
 
     /// Where to write the body and the tail.
@@ -48,7 +51,7 @@ impl Draft {
         self.tail.flush()?;
         let (file, tail) = (self.body.get_mut(), self.tail.get_mut());
         tail.rewind()?;
-        while io::copy(&mut tail.take(PIECE), file.as_file_mut())? > 0 {
+        while io::copy(&mut tail.take(PIECE), file)? > 0 {
             if !go_on() {
                 return Err(io::ErrorKind::Interrupted.into());
             }
@@ -56,12 +59,10 @@ impl Draft {
         file.rewind()?;
         file.write_all(header)?;
         // Some file systems say only now that they are full.
-        file.as_file().sync_all()?;
+        file.sync_all()?;
         if !go_on() {
             return Err(io::ErrorKind::Interrupted.into());
         }
-        let file = self.body.into_inner().map_err(io::IntoInnerError::into_error)?;
-        file.persist(path).map_err(|error| error.error)?;
-        Ok(())
+        self.name.persist(path).map_err(|error| error.error)
     }
 }
