@@ -1,0 +1,228 @@
+//! The gate that noise cannot move: how many instructions meshing takes, as valgrind's callgrind counts them, beside a
+//! committed baseline. More than 3 % above it fails.
+//!
+//! `cargo run --release -p marchless_benches --bin instructions` measures and judges; with `-- --renew` it writes
+//! `benches/instructions.txt` instead, for a change that is worth what it costs, for one that made things faster, or for
+//! another compiler. Counts of another compiler than the baseline's are shown, but not judged.
+//!
+//! Four fields of 35³ and 64³ `i16` samples, padding included, with normals, on the portable and the AVX2 backend, each
+//! forced, into warm buffers. The fields are sampled before valgrind starts, since noise under valgrind takes long;
+//! what starts under it is this program again, told to mesh one file. Valgrind knows no AVX-512.
+
+use core::{fmt, hint::black_box};
+use std::{
+    env,
+    error::Error,
+    fs, io,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+};
+
+use marchless::{Backend, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless_benches::Field;
+
+const FIELDS: [Field; 4] = [Field::Sphere, Field::Terrain, Field::Caves, Field::WhiteNoise];
+const SIZES: [u32; 2] = [35, 64];
+const BACKENDS: [Backend; 2] = [Backend::Portable, Backend::Avx2];
+/// How many times the baseline a count may be.
+const ALLOWED: f64 = 1.03;
+const RENEW: &str = "cargo run --release -p marchless_benches --bin instructions -- --renew";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = match *arguments {
+        [] => judge(),
+        ["--renew"] => renew(),
+        ["mesh", file, size, backend] => mesh(Path::new(file), size, backend),
+        _ => Err("expected no arguments, or `--renew`".into()),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("instructions: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Measures, prints, and fails where a count is too far above the baseline's.
+fn judge() -> Result<(), Box<dyn Error>> {
+    let path = baseline_path();
+    let text =
+        fs::read_to_string(&path).map_err(|error| format!("{}: {error}; `{RENEW}` writes it", path.display()))?;
+    let baseline = Counts::parse(&text)?;
+    let counts = Counts::measure()?;
+    let mut failures = Vec::new();
+    for (what, count) in &counts.of {
+        let Some(before) = baseline.of.iter().find_map(|(other, before)| (other == what).then_some(*before)) else {
+            println!("{what:30} {count:>12}, no baseline");
+            failures.push(format!("{what} has no baseline"));
+            continue;
+        };
+        let change = (*count as f64 / before as f64 - 1.0) * 100.0;
+        println!("{what:30} {count:>12}, baseline {before:>12}: {change:+.2} %");
+        if *count as f64 > before as f64 * ALLOWED {
+            failures.push(format!("{what} takes {change:.2} % more instructions"));
+        }
+    }
+    if counts.compiler != baseline.compiler {
+        println!("not judged: the baseline is of {}, this is {}", baseline.compiler, counts.compiler);
+        return Ok(());
+    }
+    if failures.is_empty() {
+        return Ok(());
+    }
+    let failures = failures.join("\n  ");
+    Err(format!("at most 3 % above {} are allowed:\n  {failures}\nIf they are worth it: {RENEW}", path.display())
+        .into())
+}
+
+fn renew() -> Result<(), Box<dyn Error>> {
+    let (path, counts) = (baseline_path(), Counts::measure()?);
+    fs::write(&path, counts.to_string()).map_err(|error| format!("{}: {error}", path.display()))?;
+    println!("{counts}written to {}", path.display());
+    Ok(())
+}
+
+fn baseline_path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("instructions.txt")
+}
+
+/// Instructions by what was meshed, and the compiler that made them.
+#[derive(Debug, PartialEq)]
+struct Counts {
+    compiler: String,
+    /// "FIELD SIZE BACKEND" and instructions.
+    of: Vec<(String, u64)>,
+}
+
+impl Counts {
+    /// Measures everything that this machine can.
+    fn measure() -> Result<Self, Box<dyn Error>> {
+        let folder = env::temp_dir().join(format!("marchless-instructions-{}", std::process::id()));
+        fs::create_dir_all(&folder)?;
+        let of = measure_in(&folder);
+        fs::remove_dir_all(&folder)?;
+        Ok(Self { of: of?, compiler: compiler()? })
+    }
+
+    /// Reads what `Display` wrote.
+    fn parse(text: &str) -> Result<Self, Box<dyn Error>> {
+        let mut compiler = None;
+        let mut of = Vec::new();
+        for line in text.lines().filter(|line| !line.is_empty()) {
+            if let Some(comment) = line.strip_prefix('#') {
+                let comment = comment.trim();
+                compiler = compiler.or_else(|| comment.starts_with("rustc ").then(|| comment.to_owned()));
+                continue;
+            }
+            let (what, count) = line.rsplit_once(' ').ok_or_else(|| format!("a baseline without a count: {line}"))?;
+            let count = count.parse().map_err(|error| format!("the baseline's line \"{line}\": {error}"))?;
+            of.push((what.trim_end().to_owned(), count));
+        }
+        Ok(Self { compiler: compiler.ok_or("the baseline names no compiler")?, of })
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "# Instructions of meshing once, as callgrind counts them: field, samples per axis, backend, count."
+        )?;
+        writeln!(f, "# Written by `{RENEW}` with")?;
+        writeln!(f, "# {}", self.compiler)?;
+        self.of.iter().try_for_each(|(what, count)| writeln!(f, "{what:24} {count}"))
+    }
+}
+
+fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
+    let mut counts = Vec::new();
+    for field in FIELDS {
+        for size in SIZES {
+            let name = field.name().replace(' ', "-");
+            let file = folder.join(format!("{name}-{size}.i16"));
+            let weights = field.distances(size).into_iter().map(i16::from_voxels);
+            fs::write(&file, weights.flat_map(i16::to_le_bytes).collect::<Vec<_>>())?;
+            for backend in BACKENDS {
+                if backend.is_available() {
+                    let what = format!("{name} {size} {}", backend.name());
+                    let count = count(&file, size, backend).map_err(|error| format!("{what}: {error}"))?;
+                    counts.push((what, count));
+                } else {
+                    println!("{name} {size} {}: skipped, this machine has no such instructions", backend.name());
+                }
+            }
+        }
+    }
+    Ok(counts)
+}
+
+/// Runs this program under callgrind, on one file.
+fn count(file: &Path, size: u32, backend: Backend) -> Result<u64, Box<dyn Error>> {
+    let mut command = Command::new("valgrind");
+    command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*mesh_and_count*"]);
+    command.arg(env::current_exe()?).arg("mesh").arg(file).args([&size.to_string(), backend.name()]);
+    let output = command.output().map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => "valgrind is not installed".to_owned(),
+        _ => format!("valgrind does not start: {error}"),
+    })?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    if !output.status.success() {
+        return Err(format!("valgrind: {}\n{said}", output.status).into());
+    }
+    let count = said.lines().find_map(|line| line.split_once("Collected :")?.1.trim().parse().ok());
+    // Should the toggle not find its function, nothing is counted.
+    count.filter(|&count| count > 0).ok_or_else(|| format!("valgrind counted nothing:\n{said}").into())
+}
+
+/// What runs under callgrind: meshes a file twice, to be counted the second time.
+fn mesh(file: &Path, size: &str, backend: &str) -> Result<(), Box<dyn Error>> {
+    let bytes = fs::read(file)?;
+    let weights: Vec<i16> = bytes.as_chunks().0.iter().map(|&chunk| i16::from_le_bytes(chunk)).collect();
+    let samples = Samples::new(Shape::cube(size.parse()?)?, &weights)?.padded();
+    let backend = BACKENDS.into_iter().find(|known| known.name() == backend).ok_or("no such backend")?;
+    if !backend.is_available() {
+        return Err("valgrind hides the instructions of this backend".into());
+    }
+    let (mut mesher, mut mesh, settings) = (Mesher::with_backend(backend), MeshBuffer::new(), MeshSettings::default());
+    mesher.mesh(samples, &settings, &mut mesh)?;
+    mesh_and_count(&mut mesher, black_box(samples), &settings, &mut mesh);
+    if black_box(&mesh).indices.is_empty() { Err("there is no surface".into()) } else { Ok(()) }
+}
+
+/// Callgrind collects inside of this function alone.
+#[inline(never)]
+fn mesh_and_count(mesher: &mut Mesher, samples: Samples<'_, i16>, settings: &MeshSettings, mesh: &mut MeshBuffer) {
+    mesher.mesh(samples, settings, mesh).expect("it went well the first time");
+}
+
+/// The compiler's version and target, in one line.
+fn compiler() -> Result<String, Box<dyn Error>> {
+    let mut command = Command::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
+    let output = command.arg("-vV").output().map_err(|error| format!("rustc does not start: {error}"))?;
+    let said = String::from_utf8(output.stdout)?;
+    let mut lines = said.lines();
+    let version = lines.next().ok_or("rustc says no version")?;
+    let host = lines.find_map(|line| line.strip_prefix("host: ")).ok_or("rustc says no host")?;
+    Ok(format!("{version} {host}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn baselines_are_read_as_they_were_written() {
+        let of = vec![("terrain 35 portable".to_owned(), 123_456), ("white-noise 64 avx2".to_owned(), 7)];
+        let counts = Counts { compiler: "rustc 1.2.3 (abc) x86_64-unknown-linux-gnu".to_owned(), of };
+        assert_eq!(Counts::parse(&counts.to_string()).expect("it is whole"), counts);
+    }
+
+    #[test]
+    fn broken_baselines_are_refused() {
+        assert!(Counts::parse("terrain 35 portable 12\n").is_err(), "no compiler");
+        assert!(Counts::parse("# rustc 1.2.3\nterrain 35 portable many\n").is_err(), "no number");
+    }
+}
