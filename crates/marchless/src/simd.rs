@@ -119,6 +119,9 @@ pub trait Simd {
     /// One bit a weight, set where it is below `threshold`; NaN is not.
     fn below_f32(weights: &[f32; 32], threshold: f32) -> u32;
 
+    /// Which words are not zero, a bit each; `words`: a multiple of eight, at most 64.
+    fn nonzero(words: &[u64]) -> u64;
+
     /// Writes the positions of the set bits of `word`, lowest first, each plus `base`, to `positions`, and `row` for each to
     /// `rows`; returns how many there are. What is written behind them means nothing.
     fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize;
@@ -128,23 +131,30 @@ pub trait Simd {
     fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize;
 
     /// Writes the triangles of cells, one after the other: for each of `codes`, 16 indices made from the running `counters` by the
-    /// code's row of `tables`, of which the next cell overwrites those that are too many. Returns how many indices count: that
+    /// entry of `cells`, of which the next cell overwrites those that are too many. Returns how many indices count: that
     /// many have been written.
     ///
     /// `indices` holds 16 for each code at least.
-    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize;
+    fn triangles(
+        cells: &[Cell; CODES],
+        codes: &[u16],
+        counters: &mut [u32; 8],
+        indices: &mut [MaybeUninit<u32>],
+    ) -> usize;
 }
 
-/// Codes of [`Tables`]; a power of two, so that a masked code needs no check.
+/// Codes of cells; a power of two, so that a masked code needs no check.
 pub(crate) const CODES: usize = 512;
 
-/// What a cell of each code adds to the mesh. See `mesher/triangles.rs`, which derives them.
-pub struct Tables {
+/// What a cell of some code adds to the mesh, in half a cache line. See `mesher/triangles.rs`, which derives them.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+pub struct Cell {
     /// For each of up to 15 indices: bits 0–2 name the counter, bit 3 is set where the vertex lies on the high side of the
     /// cell, bit 4 where it is the one behind the counter's.
-    pub vertices: [[u8; 16]; CODES],
+    pub vertices: [u8; 16],
     /// How far the cell advances each counter: 0 or 1.
-    pub steps: [[u8; 8]; CODES],
+    pub steps: [u8; 8],
     /// Indices, 0–15.
-    pub counts: [u8; CODES],
+    pub count: u8,
 }

@@ -5,26 +5,32 @@ use alloc::vec::Vec;
 use super::slabs::Lattice;
 use crate::{sample::Weight, simd::Simd};
 
-/// The signs of one slab: `words` a row.
+/// The signs of one slab: `words` a row, rows one after the other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Signs {
-    words: Vec<u64>,
+    /// Bit `x` of a row is sample `x`; unused bits of a row's last word are zero.
+    signs: Vec<u64>,
+    /// The same of each sample's neighbour at +x; of a row's last sample, its own.
+    next: Vec<u64>,
     /// Whether all samples are inside, or outside, where all are the same; the words may then be old.
     uniform: Option<bool>,
 }
 
 impl Signs {
     pub(super) const fn new() -> Self {
-        Self { words: Vec::new(), uniform: None }
+        Self { signs: Vec::new(), next: Vec::new(), uniform: None }
     }
 
     pub(super) const fn uniform(&self) -> Option<bool> {
         self.uniform
     }
 
-    /// All rows' words, one after the other. Unused bits of a row's last word are zero.
-    pub(super) fn words(&self) -> &[u64] {
-        &self.words
+    pub(super) fn signs(&self) -> &[u64] {
+        &self.signs
+    }
+
+    pub(super) fn next(&self) -> &[u64] {
+        &self.next
     }
 
     /// Takes in the slab `plane`: all its samples, padding included.
@@ -34,21 +40,48 @@ impl Signs {
         if self.uniform.is_some() {
             return;
         }
-        self.words.resize(lattice.words * lattice.size[1], 0);
-        let rows = plane[lattice.origin..].chunks(lattice.stride);
-        for (row, words) in rows.zip(self.words.chunks_exact_mut(lattice.words)) {
-            sign_row::<S, W>(&row[..lattice.size[0]], threshold, words);
+        self.resize(lattice);
+        for (y, words) in self.signs.chunks_exact_mut(lattice.words).enumerate() {
+            sign_row::<S, W>(&plane[lattice.origin + y * lattice.stride..], lattice.size[0], threshold, words);
         }
+        self.shift(lattice);
     }
 
     /// Makes sure that the words are there, for a slab beside one with other signs.
     #[inline(always)]
     pub(super) fn spell_out(&mut self, lattice: &Lattice) {
         let Some(inside) = self.uniform else { return };
-        self.words.resize(lattice.words * lattice.size[1], 0);
-        for words in self.words.chunks_exact_mut(lattice.words) {
-            words.fill(if inside { u64::MAX } else { 0 });
+        self.resize(lattice);
+        self.signs.fill(if inside { u64::MAX } else { 0 });
+        for words in self.signs.chunks_exact_mut(lattice.words) {
             words[lattice.words - 1] &= lattice.last_word;
+        }
+        self.shift(lattice);
+    }
+
+    #[inline(always)]
+    fn resize(&mut self, lattice: &Lattice) {
+        self.signs.resize(lattice.words * lattice.size[1], 0);
+        self.next.resize(lattice.words * lattice.size[1], 0);
+    }
+
+    /// Makes `next` from `signs`.
+    #[inline(always)]
+    fn shift(&mut self, lattice: &Lattice) {
+        let last = lattice.last_word ^ lattice.last_word >> 1;
+        if lattice.words == 1 {
+            for (next, &word) in self.next.iter_mut().zip(&self.signs) {
+                *next = word >> 1 | word & last;
+            }
+            return;
+        }
+        let rows = self.signs.chunks_exact(lattice.words);
+        for (next, words) in self.next.chunks_exact_mut(lattice.words).zip(rows) {
+            let ends = words.len() - 1;
+            for k in 0..ends {
+                next[k] = words[k] >> 1 | words[k + 1] << 63;
+            }
+            next[ends] = words[ends] >> 1 | words[ends] & last;
         }
     }
 }
@@ -80,26 +113,35 @@ fn uniform<S: Simd, W: Weight>(plane: &[W], threshold: W::Threshold) -> Option<b
     rest.iter().all(|weight| weight.inside(threshold) == inside).then_some(inside)
 }
 
-/// The signs of one row.
+/// The signs of the first `len` samples of `row`; what is behind them is read, too, where it is there.
 #[inline(always)]
-fn sign_row<S: Simd, W: Weight>(row: &[W], threshold: W::Threshold, words: &mut [u64]) {
-    for (word, weights) in words.iter_mut().zip(row.chunks(64)) {
-        let (whole, rest) = weights.as_chunks::<32>();
-        *word = 0;
-        for (half, weights) in whole.iter().enumerate() {
-            *word |= u64::from(W::below::<S>(weights, threshold)) << (32 * half);
-        }
-        let start = 32 * whole.len();
-        if rest.len() <= 4 {
-            // A chunk of 32 cells has 33 samples a row.
-            for (index, weight) in rest.iter().enumerate() {
-                *word |= u64::from(weight.inside(threshold)) << (start + index);
-            }
+fn sign_row<S: Simd, W: Weight>(row: &[W], len: usize, threshold: W::Threshold, words: &mut [u64]) {
+    for (index, word) in words.iter_mut().enumerate() {
+        let (weights, count) = (&row[64 * index..], len - 64 * index);
+        *word = if count >= 64 {
+            u64::from(half::<S, W>(weights, threshold)) | u64::from(half::<S, W>(&weights[32..], threshold)) << 32
+        } else if count == 33 {
+            // As many as a chunk of 32 cells has.
+            u64::from(half::<S, W>(weights, threshold)) | u64::from(weights[32].inside(threshold)) << 32
+        } else if count > 32 {
+            let high = u64::from(half::<S, W>(&weights[32..], threshold)) << 32;
+            (u64::from(half::<S, W>(weights, threshold)) | high) & ((1 << count) - 1)
         } else {
-            let mut padded = [rest[0]; 32];
-            padded[..rest.len()].copy_from_slice(rest);
-            let signs = W::below::<S>(&padded, threshold) & (u32::MAX >> (32 - rest.len()));
-            *word |= u64::from(signs) << start;
-        }
+            u64::from(half::<S, W>(weights, threshold)) & ((1 << count) - 1)
+        };
     }
+}
+
+/// The signs of the first 32 weights; of all where there are fewer.
+#[inline(always)]
+fn half<S: Simd, W: Weight>(weights: &[W], threshold: W::Threshold) -> u32 {
+    match weights.first_chunk::<32>() {
+        Some(weights) => W::below::<S>(weights, threshold),
+        None => few(weights, threshold),
+    }
+}
+
+#[cold]
+fn few<W: Weight>(weights: &[W], threshold: W::Threshold) -> u32 {
+    weights.iter().enumerate().fold(0, |signs, (index, weight)| signs | u32::from(weight.inside(threshold)) << index)
 }

@@ -68,17 +68,14 @@ impl Lattice {
         }
     }
 
-    /// Of word `word`, the bits of samples that have a neighbour at +x.
+    /// The row, and the position along x of the first sample, of a slab's word `word`.
     #[inline(always)]
-    pub(super) const fn x_edges(&self, word: usize) -> u64 {
-        let edges = self.size[0] - 1 - word * 64;
-        if edges >= 64 { u64::MAX } else { (1 << edges) - 1 }
-    }
-
-    /// The crossings on edges along x in word `word` of a row of signs.
-    #[inline(always)]
-    pub(super) fn crossed_x(&self, row: &[u64], word: usize) -> u64 {
-        (row[word] ^ shifted(row, word)) & self.x_edges(word)
+    pub(super) const fn place_of(&self, word: usize) -> (u32, u32) {
+        if self.words == 1 {
+            return (word as u32, 0);
+        }
+        let (word, words) = (word as u32, self.words as u32);
+        (word / words, 64 * (word % words))
     }
 
     /// Twice the gradient at the meshed sample at `x`, `y` with index `index`, from its slab and those `below` and `above` it.
@@ -160,13 +157,6 @@ pub(super) unsafe fn at<W: Copy>(slab: &[W], index: usize) -> W {
     unsafe { *slab.get_unchecked(index) }
 }
 
-/// The word of +x neighbours of `row[word]`.
-#[inline(always)]
-pub(super) fn shifted(row: &[u64], word: usize) -> u64 {
-    let next = if word + 1 < row.len() { row[word + 1] } else { 0 };
-    row[word] >> 1 | next << 63
-}
-
 /// A slab of samples with those around it: whole slabs, padding included. Beyond an open border the outermost slab stands in
 /// for those that are missing.
 #[derive(Clone, Copy)]
@@ -213,7 +203,7 @@ impl Slabs {
         if place == Place::First {
             self.vertices = 0;
         }
-        let (words, rows, [_, low, slab, above]) = (lattice.words, lattice.size[1], window.slabs);
+        let [_, low, slab, above] = window.slabs;
         let [before, newest] = &mut self.signs;
         core::mem::swap(before, newest);
         newest.fill::<S, W>(lattice, slab, W::threshold(settings.isovalue));
@@ -229,9 +219,7 @@ impl Slabs {
                 materials: window.materials,
                 z: window.z.wrapping_sub(1),
             };
-            let (low, high) = (before.words(), newest.words());
-            let crossed = |y: usize, word: usize| low[y * words + word] ^ high[y * words + word];
-            self.vertices += pass.place::<S, 2>(lattice, &planes, settings, rows, crossed, out);
+            self.vertices += pass.place::<S, 2>(lattice, &planes, settings, before.signs(), newest.signs(), out);
         }
         self.first = [self.vertices; 2];
         if newest.uniform().is_none() {
@@ -241,16 +229,15 @@ impl Slabs {
                 materials: window.materials.map(|[_, materials]| [materials; 2]),
                 z: window.z,
             };
-            let signs = newest.words();
-            let along_x = |y: usize, word: usize| lattice.crossed_x(&signs[y * words..][..words], word);
-            let along_y = |y: usize, word: usize| signs[y * words + word] ^ signs[(y + 1) * words + word];
+            let (signs, next) = (newest.signs(), newest.next());
             if place == Place::Last {
-                let places = (0..rows).flat_map(|y| (0..words).map(move |word| (y, word)));
-                self.first[1] += places.map(|(y, word)| u64::from(along_x(y, word).count_ones())).sum::<u64>();
+                self.first[1] += triangles::crossings(signs, next);
             } else {
-                self.vertices += pass.place::<S, 0>(lattice, &planes, settings, rows, along_x, out);
+                self.vertices += pass.place::<S, 0>(lattice, &planes, settings, signs, next, out);
                 self.first[1] = self.vertices;
-                self.vertices += pass.place::<S, 1>(lattice, &planes, settings, rows - 1, along_y, out);
+                let below_last_row = &signs[..signs.len() - lattice.words];
+                self.vertices +=
+                    pass.place::<S, 1>(lattice, &planes, settings, below_last_row, &signs[lattice.words..], out);
             }
         }
         if self.vertices > u64::from(u32::MAX) {

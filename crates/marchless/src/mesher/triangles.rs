@@ -4,21 +4,23 @@
 //! belongs to an active cell; so counters that each active cell advances by its own crossings always stand at the next
 //! vertex, and run on from row to row. There are eight: four for the cell's edges along x, and four for those along y and z on its low
 //! side. The high side needs none: there the next vertex is the one behind the low side's. Behind each row comes a code that
-//! is no cell: it takes the counters past the crossings on the row's last samples, which are on no cell's low side.
+//! is no cell: it takes the counters past the crossings on the row's last samples, which are on no cell's low side. It is the
+//! case of a cell whose high side repeats these samples, moved up.
 
 use alloc::vec::Vec;
 
 use super::{
     classify::Signs,
     output::{keep, room},
-    slabs::{Lattice, shifted},
+    slabs::Lattice,
+    vertices::filled,
 };
 use crate::{
     cases::{CROSSED_EDGES, TRIANGLE_COUNTS, TRIANGLES},
-    simd::{CODES, Simd, Tables},
+    simd::{CODES, Cell, Simd},
 };
 
-/// Codes of cells are their cases; behind these come those that close a row, one for each set of signs of its four last samples.
+/// Codes of cells are their cases; behind these come those that close a row.
 const CLOSING: u16 = 256;
 
 /// Codes that are gathered before they become triangles: enough to make the loop over them long, few enough to stay in the first cache.
@@ -41,46 +43,43 @@ pub(super) fn join<S: Simd>(
     first: &FirstVertices,
     indices: &mut Vec<u32>,
 ) {
-    let (words, last_bit) = (lattice.words, (lattice.size[0] - 1) % 64);
-    let (low, high) = (&low.words()[..words * lattice.size[1]], &high.words()[..words * lattice.size[1]]);
-
-    let in_first_row = |crossed: fn(&Lattice, &[u64], &[u64], usize) -> u64, a: &[u64], b: &[u64]| {
-        (0..words).map(|word| crossed(lattice, a, b, word).count_ones()).sum::<u32>()
-    };
-    let along_x = |lattice: &Lattice, row: &[u64], _: &[u64], word| lattice.crossed_x(row, word);
-    let along_z = |_: &Lattice, low: &[u64], high: &[u64], word: usize| low[word] ^ high[word];
+    let words = lattice.words;
+    let row = |signs: &[u64], next: &[u64]| crossings(&signs[..words], &next[..words]) as u32;
     let mut counters = [
         first.x[0],
-        first.x[0].wrapping_add(in_first_row(along_x, &low[..words], &[])),
+        first.x[0].wrapping_add(row(low.signs(), low.next())),
         first.x[1],
-        first.x[1].wrapping_add(in_first_row(along_x, &high[..words], &[])),
+        first.x[1].wrapping_add(row(high.signs(), high.next())),
         first.y[0],
         first.y[1],
         first.z,
-        first.z.wrapping_add(in_first_row(along_z, low, high)),
+        first.z.wrapping_add(row(low.signs(), high.signs())),
     ];
-
-    let (mut codes, mut gathered) = ([0u16; GATHERED + 65], 0);
-    for y in 0..lattice.size[1] - 1 {
-        let at = y * words;
-        let rows =
-            [&low[at..][..words], &low[at + words..][..words], &high[at..][..words], &high[at + words..][..words]];
-        for word in 0..words {
-            let signs = rows.map(|row| row[word]);
-            let next = rows.map(|row| shifted(row, word));
-            let any = signs.iter().chain(&next).fold(0, |any, word| any | word);
-            let all = signs.iter().chain(&next).fold(u64::MAX, |all, word| all & word);
-            let active = any & !all & lattice.x_edges(word);
-            if active != 0 {
-                let corners = [signs[0], next[0], signs[1], next[1], signs[2], next[2], signs[3], next[3]];
-                let codes = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
-                gathered += S::cases(corners, active, codes);
-            }
-            if word + 1 == words {
-                let [a, b, c, d] = signs.map(|signs| (signs >> last_bit & 1) as u16);
-                let set = a | b << 1 | c << 2 | d << 3;
-                codes[gathered] = CLOSING + set;
-                gathered += usize::from(set != 0 && set != 15);
+    let last_bit = lattice.last_word ^ lattice.last_word >> 1;
+    let (mut codes, mut gathered) = ([0u16; GATHERED + 64], 0);
+    let mut active = [0; 64];
+    let cells = words * (lattice.size[1] - 1);
+    for start in (0..cells).step_by(64) {
+        let count = (cells - start).min(64);
+        // The eight corners of the cells, one word each.
+        let [a, c] = of_rows(low.signs(), start, count, words);
+        let [b, d] = of_rows(low.next(), start, count, words);
+        let [e, g] = of_rows(high.signs(), start, count, words);
+        let [f, h] = of_rows(high.next(), start, count, words);
+        for i in 0..count {
+            let any = a[i] | b[i] | c[i] | d[i] | e[i] | f[i] | g[i] | h[i];
+            let all = a[i] & b[i] & c[i] & d[i] & e[i] & f[i] & g[i] & h[i];
+            active[i] = any & !all;
+        }
+        let mut nonzero = S::nonzero(filled(&mut active, count));
+        while nonzero != 0 {
+            let i = nonzero.trailing_zeros() as usize;
+            nonzero &= nonzero - 1;
+            let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
+            let room = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
+            gathered += S::cases(corners, active[i % 64], room);
+            if (start + i + 1) % words == 0 && active[i % 64] & last_bit != 0 {
+                codes[gathered - 1] += CLOSING;
             }
             if gathered >= GATHERED {
                 flush::<S>(&codes[..gathered], &mut counters, indices);
@@ -91,9 +90,21 @@ pub(super) fn join<S: Simd>(
     flush::<S>(&codes[..gathered], &mut counters, indices);
 }
 
+/// The words from `start` on of a row and of the next one.
+#[inline(always)]
+fn of_rows(signs: &[u64], start: usize, count: usize, words: usize) -> [&[u64]; 2] {
+    [&signs[start..][..count], &signs[start + words..][..count]]
+}
+
+/// How many edges between samples of these signs the surface crosses.
+#[inline(always)]
+pub(super) fn crossings(low: &[u64], high: &[u64]) -> u64 {
+    low.iter().zip(high).map(|(low, high)| u64::from((low ^ high).count_ones())).sum()
+}
+
 #[inline(always)]
 fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>) {
-    let kept = S::triangles(&TABLES, codes, counters, room(indices, 16 * codes.len()));
+    let kept = S::triangles(&CELLS, codes, counters, room(indices, 16 * codes.len()));
     // SAFETY: the backend has written them.
     #[expect(unsafe_code, reason = "spares filling the vector with zeros first")]
     unsafe {
@@ -102,15 +113,15 @@ fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>
 }
 
 /// What each code adds to the mesh.
-pub(crate) static TABLES: Tables = {
-    let mut tables = Tables { vertices: [[0; 16]; CODES], steps: [[0; 8]; CODES], counts: [0; CODES] };
+static CELLS: [Cell; CODES] = {
+    let mut rows = [Cell { vertices: [0; 16], steps: [0; 8], count: 0 }; CODES];
     let mut case = 0;
     while case < 256 {
         let crossed = CROSSED_EDGES[case];
         let mut index = 0;
         while index < 15 {
             let edge = TRIANGLES[case][index / 3][index % 3].index();
-            tables.vertices[case][index] = if edge < 4 {
+            rows[case].vertices[index] = if edge < 4 {
                 edge as u8
             } else {
                 let (low, high) = (edge & !1, edge & 1);
@@ -120,18 +131,18 @@ pub(crate) static TABLES: Tables = {
         }
         let mut lane = 0;
         while lane < 4 {
-            tables.steps[case][lane] = (crossed >> lane & 1) as u8;
-            tables.steps[case][4 + lane] = (crossed >> (4 + 2 * lane) & 1) as u8;
+            rows[case].steps[lane] = (crossed >> lane & 1) as u8;
+            rows[case].steps[4 + lane] = (crossed >> (4 + 2 * lane) & 1) as u8;
             lane += 1;
         }
-        tables.counts[case] = 3 * TRIANGLE_COUNTS[case];
+        rows[case].count = 3 * TRIANGLE_COUNTS[case];
         case += 1;
     }
-    let mut set = 0;
-    while set < 16 {
-        let [a, b, c, d] = [set & 1, set >> 1 & 1, set >> 2 & 1, set >> 3];
-        tables.steps[CLOSING as usize + set] = [0, 0, 0, 0, (a ^ b) as u8, (c ^ d) as u8, (a ^ c) as u8, (b ^ d) as u8];
-        set += 1;
+    let mut case = 0;
+    while case < 256 {
+        let [a, b, c, d] = [case & 1, case >> 2 & 1, case >> 4 & 1, case >> 6 & 1];
+        rows[CLOSING as usize + case].steps = [0, 0, 0, 0, (a ^ b) as u8, (c ^ d) as u8, (a ^ c) as u8, (b ^ d) as u8];
+        case += 1;
     }
-    tables
+    rows
 };

@@ -65,29 +65,32 @@ impl<W: Weight> Vertices<W> {
         }
     }
 
-    /// Makes the vertices on all edges along `AXIS` and returns how many there are; `crossed` gives a word of crossings of
-    /// a row, one of the first `rows`.
+    /// Makes the vertices on all edges along `AXIS`, row by row, and returns how many there are. `low` and `high`: the signs of the edges' ends.
     #[inline(always)]
     pub(super) fn place<S: Simd, const AXIS: usize>(
         &mut self,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
         settings: &MeshSettings,
-        rows: usize,
-        crossed: impl Fn(usize, usize) -> u64,
+        low: &[u64],
+        high: &[u64],
         out: &mut MeshBuffer,
     ) -> u64 {
         let mut made = 0;
-        for y in 0..rows {
-            for word in 0..lattice.words {
-                let crossed = crossed(y, word);
-                if crossed == 0 {
-                    continue;
-                }
-                let (x, rows) = (&mut self.x[self.gathered..], &mut self.y[self.gathered..]);
-                let (x, rows) = (x.first_chunk_mut(), rows.first_chunk_mut());
-                let (x, rows) = x.zip(rows).expect("there is room for another word's crossings");
-                self.gathered += S::positions(crossed, 64 * word as u32, y as u32, x, rows);
+        let mut crossed = [0; 64];
+        for (block, (low, high)) in low.chunks(64).zip(high.chunks(64)).enumerate() {
+            for (crossed, (low, high)) in crossed.iter_mut().zip(low.iter().zip(high)) {
+                *crossed = low ^ high;
+            }
+            let mut words = S::nonzero(filled(&mut crossed, low.len()));
+            while words != 0 {
+                let word = words.trailing_zeros() as usize;
+                words &= words - 1;
+                let (y, x) = lattice.place_of(64 * block + word);
+                let (xs, ys) = (&mut self.x[self.gathered..], &mut self.y[self.gathered..]);
+                let (xs, ys) =
+                    xs.first_chunk_mut().zip(ys.first_chunk_mut()).expect("there is room for another word's");
+                self.gathered += S::positions(crossed[word % 64], x, y, xs, ys);
                 if self.gathered >= GATHERED {
                     made += self.flush::<AXIS>(lattice, planes, settings, out);
                 }
@@ -282,6 +285,14 @@ impl<W: Weight> Vertices<W> {
             }
         }
     }
+}
+
+/// The first `count` words of a block, made up with zeros to a multiple of eight.
+#[inline(always)]
+pub(super) fn filled(block: &mut [u64; 64], count: usize) -> &[u64] {
+    let room = count.next_multiple_of(8);
+    block[count..room].fill(0);
+    &block[..room]
 }
 
 /// How far along the edge from `a` to `b` its vertex lies; `isovalue` in steps (voxels × `SCALE`).

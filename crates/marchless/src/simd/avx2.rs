@@ -6,7 +6,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, Job, Simd, Tables, all, portable::Portable};
+use super::{CODES, Cell, Job, Simd, all, portable::Portable};
 
 pub(super) fn is_available() -> bool {
     all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt")
@@ -42,6 +42,12 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn nonzero(words: &[u64]) -> u64 {
+        // SAFETY: within `run`.
+        unsafe { nonzero(words) }
+    }
+
+    #[inline(always)]
     fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
         Portable::positions(word, base, row, positions, rows)
     }
@@ -53,9 +59,14 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+    fn triangles(
+        cells: &[Cell; CODES],
+        codes: &[u16],
+        counters: &mut [u32; 8],
+        indices: &mut [MaybeUninit<u32>],
+    ) -> usize {
         // SAFETY: within `run`.
-        unsafe { self::triangles(tables, codes, counters, indices) }
+        unsafe { self::triangles(cells, codes, counters, indices) }
     }
 }
 
@@ -97,6 +108,19 @@ fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
 }
 
 #[inline]
+#[target_feature(enable = "avx2")]
+fn nonzero(words: &[u64]) -> u64 {
+    let mut nonzero = 0;
+    for (index, four) in words.as_chunks::<4>().0.iter().enumerate() {
+        // SAFETY: the load is all of the four words.
+        let words = unsafe { _mm256_loadu_si256(four.as_ptr().cast()) };
+        let zeros = _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(words, _mm256_setzero_si256())));
+        nonzero |= ((zeros ^ 15) as u64) << (4 * index);
+    }
+    nonzero
+}
+
+#[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
     let count = active.count_ones() as usize;
@@ -129,19 +153,18 @@ fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+fn triangles(cells: &[Cell; CODES], codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
     assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
     let mut end = 0;
     // SAFETY: the load is all of the counters.
     let mut running = unsafe { _mm256_loadu_si256(counters.as_ptr().cast()) };
     for &code in codes {
-        let code = usize::from(code) % CODES;
-        let (row, steps) = (tables.vertices[code].as_ptr(), tables.steps[code].as_ptr());
+        let cell = &cells[usize::from(code) % CODES];
         for half in [0, 8] {
-            // SAFETY: the load is half of the row. `end` grows by 15 a code at most, so that the 16 indices from it on lie within
+            // SAFETY: the load is half of the vertices. `end` grows by 15 a code at most, so that the 16 indices from it on lie within
             // what was asserted.
             unsafe {
-                let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(row.add(half).cast()));
+                let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(cell.vertices.as_ptr().add(half).cast()));
                 // The permutation looks at bits 0 to 2 only.
                 let first = _mm256_permutevar8x32_epi32(running, vertices);
                 let indices_of_half = _mm256_add_epi32(first, _mm256_srli_epi32::<4>(vertices));
@@ -149,8 +172,9 @@ fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &
             }
         }
         // SAFETY: the load is all of the eight steps.
-        running = _mm256_add_epi32(running, _mm256_cvtepu8_epi32(unsafe { _mm_loadl_epi64(steps.cast()) }));
-        end += usize::from(tables.counts[code]);
+        running =
+            _mm256_add_epi32(running, _mm256_cvtepu8_epi32(unsafe { _mm_loadl_epi64(cell.steps.as_ptr().cast()) }));
+        end += usize::from(cell.count);
     }
     // SAFETY: the store is all of the counters.
     unsafe { _mm256_storeu_si256(counters.as_mut_ptr().cast(), running) }

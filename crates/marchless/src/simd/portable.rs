@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::{CODES, Simd, Tables};
+use super::{CODES, Cell, Simd};
 
 pub(super) struct Portable;
 
@@ -20,6 +20,11 @@ impl Simd for Portable {
     #[inline(always)]
     fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
         below(weights, threshold)
+    }
+
+    #[inline(always)]
+    fn nonzero(words: &[u64]) -> u64 {
+        words.iter().enumerate().fold(0, |nonzero, (index, &word)| nonzero | u64::from(word != 0) << index)
     }
 
     #[inline(always)]
@@ -50,22 +55,27 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+    fn triangles(
+        cells: &[Cell; CODES],
+        codes: &[u16],
+        counters: &mut [u32; 8],
+        indices: &mut [MaybeUninit<u32>],
+    ) -> usize {
         let mut end = 0;
         for &code in codes {
-            let code = usize::from(code) % CODES;
-            let (steps, mut vertices) = (&tables.steps[code], [0; 16]);
+            let cell = &cells[usize::from(code) % CODES];
+            let mut vertices = [0; 16];
             for lane in 0..8 {
                 vertices[lane] = counters[lane];
-                counters[lane] += u32::from(steps[lane]);
+                counters[lane] += u32::from(cell.steps[lane]);
                 vertices[8 + lane] = counters[lane];
             }
             if let Some(indices) = indices[end..].first_chunk_mut::<16>() {
-                for (index, vertex) in indices.iter_mut().zip(tables.vertices[code]) {
+                for (index, vertex) in indices.iter_mut().zip(cell.vertices) {
                     index.write(vertices[usize::from(vertex) % 16]);
                 }
             }
-            end += usize::from(tables.counts[code]);
+            end += usize::from(cell.count);
         }
         end
     }

@@ -3,7 +3,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{Simd, Tables, portable::Portable};
+use super::{CODES, Cell, Simd, portable::Portable};
 
 pub(super) struct Sse2;
 
@@ -45,6 +45,11 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
+    fn nonzero(words: &[u64]) -> u64 {
+        Portable::nonzero(words)
+    }
+
+    #[inline(always)]
     fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize {
         Portable::positions(word, base, row, positions, rows)
     }
@@ -55,7 +60,12 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
-    fn triangles(tables: &Tables, codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
-        Portable::triangles(tables, codes, counters, indices)
+    fn triangles(
+        cells: &[Cell; CODES],
+        codes: &[u16],
+        counters: &mut [u32; 8],
+        indices: &mut [MaybeUninit<u32>],
+    ) -> usize {
+        Portable::triangles(cells, codes, counters, indices)
     }
 }
