@@ -79,7 +79,9 @@ pub use grid::{
     Block, Chunk, ChunkSamples, DEFAULT_CHUNK_CELLS, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, Neighbourhood,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
-pub use mesher::{MeshError, MeshSettings, Mesher};
+#[cfg(feature = "std")]
+pub use mesher::ThreadedMesher;
+pub use mesher::{MeshError, MeshSettings, Mesher, SlabMesher};
 pub use query::{RayHit, ray_cast, weight_at};
 pub use sample::{Voxel, Weight};
 pub use simd::Backend;

@@ -19,6 +19,9 @@
 mod classify;
 mod output;
 mod slabs;
+mod stream;
+#[cfg(feature = "std")]
+mod threads;
 mod triangles;
 mod vertices;
 
@@ -30,7 +33,10 @@ use crate::{
     sample::Weight,
     simd::{Backend, dispatch},
 };
-use slabs::{Lattice, Slabs, Volume};
+use slabs::{Lattice, Part, Slabs};
+pub use stream::SlabMesher;
+#[cfg(feature = "std")]
+pub use threads::ThreadedMesher;
 pub(crate) use vertices::crossing_fraction;
 
 /// How to mesh.
@@ -118,8 +124,8 @@ impl Mesher {
         settings.check()?;
         let lattice = Lattice::of(&samples)?;
         let backend = *self.backend.get_or_insert_with(Backend::fastest);
-        let volume = Volume { samples, lattice, settings, slabs: &mut self.slabs, out };
-        let meshed = dispatch(backend, volume);
+        let cells = 0..lattice.size[2] - 1;
+        let meshed = dispatch(backend, Part { samples, lattice, cells, settings, slabs: &mut self.slabs, out });
         if meshed.is_err() {
             out.clear();
         }
@@ -150,6 +156,28 @@ pub enum MeshError {
         shape: Shape,
         /// 2, or 4 where the outermost layer is padding.
         least: u32,
+    },
+    /// Slabs have no cells, or do not fit in memory.
+    #[error("slabs need at least 2 samples along x and y and must fit in memory, but they are {} × {}", size[0], size[1])]
+    SlabSize {
+        /// What was given: samples along x and y.
+        size: [u32; 2],
+    },
+    /// A slab is not as large as was said.
+    #[error("a slab of {} × {} samples needs {expected} weights, but there are {found}", size[0], size[1])]
+    SlabLength {
+        /// Samples along x and y.
+        size: [u32; 2],
+        /// Their product.
+        expected: usize,
+        /// The slice's length.
+        found: usize,
+    },
+    /// There are no cells between the slabs.
+    #[error("meshing needs at least 2 slabs, but there are {found}")]
+    TooFewSlabs {
+        /// How many came.
+        found: usize,
     },
     /// The vertices would not fit `u32` indices.
     #[error("the surface has at least {found} vertices, more than 32-bit indices can name")]

@@ -1,5 +1,7 @@
 //! The order of things: what becomes of one slab of samples after the other, and of a whole volume.
 
+use core::ops::Range;
+
 use super::{
     MeshError, MeshSettings,
     classify::Signs,
@@ -8,7 +10,7 @@ use super::{
 };
 use crate::{
     buffer::MeshBuffer,
-    lattice::Samples,
+    lattice::{Samples, Shape},
     sample::Weight,
     simd::{Job, Simd},
 };
@@ -39,17 +41,31 @@ impl Lattice {
         if shape.size().iter().any(|&size| size < least) {
             return Err(MeshError::TooSmall { shape, least });
         }
-        let size = shape.size().map(|size| (size - 2 * padding) as usize);
-        let stride = shape.size()[0] as usize;
-        Ok(Self {
+        let depth = (shape.size()[2] - 2 * padding) as usize;
+        let [_, stride, len] = shape.strides();
+        let size = [0, 1].map(|axis| (shape.size()[axis] - 2 * padding) as usize);
+        Ok(Self::new([size[0], size[1], depth], padding as usize, stride, len))
+    }
+
+    /// The lattice of slabs of `size` samples without padding, of which nobody knows how many there are; `None` where they have no cells or do
+    /// not fit in memory.
+    pub(super) fn of_slabs(size: [u32; 2]) -> Option<Self> {
+        let shape = Shape::new([size[0], size[1], 1]).ok()?;
+        let [_, stride, len] = shape.strides();
+        (size[0] >= 2 && size[1] >= 2)
+            .then(|| Self::new([size[0] as usize, size[1] as usize, usize::MAX], 0, stride, len))
+    }
+
+    fn new(size: [usize; 3], padding: usize, stride: usize, len: usize) -> Self {
+        Self {
             size,
-            padded: samples.is_padded(),
-            len: shape.strides()[2],
-            origin: padding as usize * (1 + stride),
+            padded: padding == 1,
+            len,
+            origin: padding * (1 + stride),
             stride,
             words: size[0].div_ceil(64),
             last_word: u64::MAX >> (size[0].next_multiple_of(64) - size[0]),
-        })
+        }
     }
 
     /// The index in its slab of the meshed sample at `x`, `y`.
@@ -262,28 +278,59 @@ pub(super) enum Place {
     Last,
 }
 
-/// A volume to be meshed, or a part of it.
-pub(super) struct Volume<'a, W> {
+/// The cells between some slabs of a volume.
+pub(super) struct Part<'a, W> {
     pub(super) samples: Samples<'a, W>,
     pub(super) lattice: Lattice,
+    /// Cells along z; not empty.
+    pub(super) cells: Range<usize>,
     pub(super) settings: &'a MeshSettings,
     pub(super) slabs: &'a mut Slabs,
     pub(super) out: &'a mut MeshBuffer,
 }
 
-impl<W: Weight> Job for Volume<'_, W> {
+impl<W: Weight> Job for Part<'_, W> {
     type Output = Result<(), MeshError>;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Self::Output {
-        let Self { samples, lattice, settings, slabs, out } = self;
-        let depth = lattice.size[2];
+        let Self { samples, lattice, cells, settings, slabs, out } = self;
+        let is_last_part = cells.end + 1 == lattice.size[2];
         let mut pass = Vertices::new();
-        for z in 0..depth {
+        for z in cells.start..cells.end + 1 {
+            let place = if z == cells.start {
+                Place::First
+            } else if z == cells.end && !is_last_part {
+                Place::Last
+            } else {
+                Place::Next
+            };
             let window = Window::of(&samples, &lattice, z);
-            let place = if z == 0 { Place::First } else { Place::Next };
             slabs.step::<S, W>(&lattice, &window, place, settings, &mut pass, out)?;
         }
+        pass.bounds.widen(out);
+        Ok(())
+    }
+}
+
+/// One slab of many that come one by one.
+pub(super) struct NextSlab<'a, W> {
+    pub(super) lattice: &'a Lattice,
+    pub(super) window: Window<'a, W>,
+    pub(super) settings: &'a MeshSettings,
+    pub(super) slabs: &'a mut Slabs,
+    pub(super) out: &'a mut MeshBuffer,
+}
+
+impl<W: Weight> Job for NextSlab<'_, W> {
+    type Output = Result<(), MeshError>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let Self { lattice, window, settings, slabs, out } = self;
+        let place = if window.z == 0 { Place::First } else { Place::Next };
+        let mut pass = Vertices::new();
+        slabs.step::<S, W>(lattice, &window, place, settings, &mut pass, out)?;
         pass.bounds.widen(out);
         Ok(())
     }

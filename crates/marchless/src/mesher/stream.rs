@@ -1,0 +1,107 @@
+//! [`SlabMesher`]: volumes that come slab by slab, and need not fit in memory.
+
+use alloc::vec::Vec;
+
+use super::{
+    MeshError, MeshSettings,
+    slabs::{Lattice, NextSlab, Slabs, Window},
+};
+use crate::{
+    buffer::MeshBuffer,
+    sample::Weight,
+    simd::{Backend, dispatch},
+};
+
+/// Meshes a volume that is fed slab by slab, along z; holds four slabs of it.
+///
+/// All together that it makes is what [`Mesher::mesh`](super::Mesher::mesh) makes of the whole volume at once, byte for byte; the same
+/// promises hold.
+///
+/// ```
+/// use marchless::{MeshBuffer, MeshSettings, SlabMesher};
+///
+/// // A slope, 16 samples high, of which only one slab is ever there.
+/// let mut mesher = SlabMesher::new([32, 32], MeshSettings::default())?;
+/// let mut mesh = MeshBuffer::new();
+/// let mut triangles = 0;
+/// for z in 0..16 {
+///     let slab: Vec<f32> = (0..32 * 32).map(|index| z as f32 - (index % 32) as f32 / 3.0).collect();
+///     mesher.push(&slab, &mut mesh)?;
+///     // The mesh could be written to a file here: vertices may go, indices go on counting.
+///     triangles += mesh.triangle_count();
+///     mesh.clear();
+/// }
+/// mesher.finish(&mut mesh)?;
+/// triangles += mesh.triangle_count();
+/// assert!(triangles > 2000);
+/// # Ok::<(), marchless::MeshError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SlabMesher<W> {
+    backend: Backend,
+    settings: MeshSettings,
+    size: [u32; 2],
+    lattice: Lattice,
+    slabs: Slabs,
+    /// The newest slabs: slab `z` at `z % 4`.
+    newest: [Vec<W>; 4],
+    /// Slabs that have come.
+    count: usize,
+}
+
+impl<W: Weight> SlabMesher<W> {
+    /// A mesher of slabs of `size` samples along x and y, at least 2 each. All their cells are meshed; at the
+    /// volume's border the gradient is one-sided.
+    ///
+    /// # Errors
+    /// [`MeshError::SlabSize`], [`MeshError::Isovalue`].
+    pub fn new(size: [u32; 2], settings: MeshSettings) -> Result<Self, MeshError> {
+        settings.check()?;
+        let lattice = Lattice::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
+        let (backend, slabs) = (Backend::fastest(), Slabs::new());
+        Ok(Self { backend, settings, size, lattice, slabs, newest: Default::default(), count: 0 })
+    }
+
+    /// Takes in the next slab and appends to `out` what it completes. `slab`: `[nx·ny]`, x fastest.
+    ///
+    /// Vertices, indices and bounds may be taken out of `out` between calls: indices go on counting all vertices since the first slab.
+    ///
+    /// # Errors
+    /// [`MeshError::SlabLength`], and nothing has changed; [`MeshError::TooManyVertices`], and so with every further call.
+    pub fn push(&mut self, slab: &[W], out: &mut MeshBuffer) -> Result<(), MeshError> {
+        if slab.len() != self.lattice.len {
+            let (size, expected) = (self.size, self.lattice.len);
+            return Err(MeshError::SlabLength { size, expected, found: slab.len() });
+        }
+        let newest = &mut self.newest[self.count % 4];
+        newest.clear();
+        newest.extend_from_slice(slab);
+        self.count += 1;
+        // Gradients need the slab above.
+        if self.count >= 2 { self.step(self.count - 2, out) } else { Ok(()) }
+    }
+
+    /// Appends to `out` what is left to be made once the last slab is in.
+    ///
+    /// # Errors
+    /// [`MeshError::TooFewSlabs`] where fewer than 2 slabs have come; [`MeshError::TooManyVertices`].
+    pub fn finish(mut self, out: &mut MeshBuffer) -> Result<(), MeshError> {
+        if self.count < 2 {
+            return Err(MeshError::TooFewSlabs { found: self.count });
+        }
+        self.step(self.count - 1, out)
+    }
+
+    fn step(&mut self, z: usize, out: &mut MeshBuffer) -> Result<(), MeshError> {
+        let last = self.count - 1;
+        let around = [z.saturating_sub(2), z.saturating_sub(1), z, last.min(z + 1)];
+        let window = Window {
+            slabs: around.map(|z| &self.newest[z % 4][..]),
+            materials: None,
+            z,
+            one_sided: [z <= 1, z == 0 || z == last],
+        };
+        let (lattice, settings, slabs) = (&self.lattice, &self.settings, &mut self.slabs);
+        dispatch(self.backend, NextSlab { lattice, window, settings, slabs, out })
+    }
+}

@@ -1,0 +1,149 @@
+//! However a mesh is made, it is the same mesh, byte for byte: on every backend, slab by slab, and on any number of threads.
+
+#[path = "support/fields.rs"]
+mod fields;
+
+use std::num::NonZero;
+
+use fields::{Field, TestWeight};
+use marchless::{Backend, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher, ThreadedMesher};
+use proptest::prelude::*;
+
+/// A mesh down to the last bit, signs of zeros and all.
+#[derive(Debug, PartialEq)]
+struct Bits {
+    positions: Vec<[u32; 3]>,
+    normals: Vec<[u32; 3]>,
+    materials: Vec<u8>,
+    indices: Vec<u32>,
+    bounds: Option<[[u32; 3]; 2]>,
+}
+
+fn bits(mesh: &MeshBuffer) -> Bits {
+    let vectors = |vectors: &[[f32; 3]]| vectors.iter().map(|vector| vector.map(f32::to_bits)).collect();
+    Bits {
+        positions: vectors(&mesh.positions),
+        normals: vectors(&mesh.normals),
+        materials: mesh.materials.clone(),
+        indices: mesh.indices.clone(),
+        bounds: mesh.bounds.map(|bounds| bounds.map(|corner| corner.map(f32::to_bits))),
+    }
+}
+
+fn meshed<W: TestWeight>(mut mesher: Mesher, samples: Samples<'_, W>, settings: &MeshSettings) -> Bits {
+    let mut mesh = MeshBuffer::new();
+    mesher.mesh(samples, settings, &mut mesh).expect("the samples can be meshed");
+    bits(&mesh)
+}
+
+/// Slab by slab; what comes out is taken away after some of them.
+fn streamed<W: TestWeight>(samples: Samples<'_, W>, settings: &MeshSettings, taken_every: usize) -> Bits {
+    let [nx, ny, _] = samples.shape().size();
+    let mut mesher = SlabMesher::new([nx, ny], *settings).expect("the slabs have cells");
+    let (mut piece, mut whole) = (MeshBuffer::new(), MeshBuffer::new());
+    let mut take = |piece: &mut MeshBuffer| {
+        whole.positions.append(&mut piece.positions);
+        whole.normals.append(&mut piece.normals);
+        whole.indices.append(&mut piece.indices);
+        whole.bounds = match (whole.bounds, piece.bounds.take()) {
+            (Some([min, max]), Some([low, high])) => {
+                Some([[0, 1, 2].map(|k| min[k].min(low[k])), [0, 1, 2].map(|k| max[k].max(high[k]))])
+            }
+            (bounds, None) | (None, bounds) => bounds,
+        };
+    };
+    for (z, slab) in samples.weights().chunks(nx as usize * ny as usize).enumerate() {
+        mesher.push(slab, &mut piece).expect("the slab is whole");
+        if z % taken_every == 0 {
+            take(&mut piece);
+        }
+    }
+    mesher.finish(&mut piece).expect("there are slabs enough");
+    take(&mut piece);
+    bits(&whole)
+}
+
+fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> Result<(), TestCaseError> {
+    let settings = MeshSettings { isovalue: field.isovalue, normals };
+    let portable = meshed(Mesher::with_backend(Backend::Portable), field.samples(), &settings);
+    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        let mesh = meshed(Mesher::with_backend(backend), field.samples(), &settings);
+        prop_assert_eq!(&mesh, &portable, "{}", backend.name());
+    }
+    for threads in 1..=3 {
+        let mut mesh = MeshBuffer::new();
+        let mut mesher = ThreadedMesher::new(NonZero::new(threads).expect("there is a thread"));
+        mesher.mesh(field.samples(), &settings, &mut mesh)?;
+        prop_assert_eq!(&bits(&mesh), &portable, "{} threads", threads);
+    }
+
+    let unpadded = Samples::new(field.shape, &field.weights)?;
+    let whole = meshed(Mesher::new(), unpadded, &settings);
+    prop_assert_eq!(&streamed(unpadded, &settings, taken_every), &whole);
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn fields_of_i8_are_the_same(field in Field::<i8>::any(), normals: bool, taken_every in 1usize..9) {
+        check(&field, normals, taken_every)?;
+    }
+
+    #[test]
+    fn fields_of_i16_are_the_same(field in Field::<i16>::any(), normals: bool, taken_every in 1usize..9) {
+        check(&field, normals, taken_every)?;
+    }
+
+    #[test]
+    fn fields_of_f32_are_the_same(field in Field::<f32>::any(), normals: bool, taken_every in 1usize..9) {
+        check(&field, normals, taken_every)?;
+    }
+}
+
+/// Every way in which 8 samples, three times behind one another, can lie: all cases of a cell beside all of its neighbour.
+#[test]
+fn all_pairs_of_cases_are_the_same() {
+    let shape = Shape::new([3, 2, 2]).expect("the size is small");
+    let settings = MeshSettings::default();
+    for signs in 0..1u32 << 12 {
+        let weights: Vec<f32> =
+            (0..12).map(|index| if signs >> index & 1 == 1 { -1.0 } else { 0.5 + index as f32 }).collect();
+        let samples = Samples::new(shape, &weights).expect("one weight a sample");
+        let portable = meshed(Mesher::with_backend(Backend::Portable), samples, &settings);
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            assert_eq!(meshed(Mesher::with_backend(backend), samples, &settings), portable, "{}", backend.name());
+        }
+    }
+}
+
+#[test]
+fn machines_without_a_backend_do_without() {
+    let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
+    let samples = Samples::new(Shape::cube(2).expect("the size is small"), &weights).expect("one weight a sample");
+    let plain = meshed(Mesher::with_backend(Backend::Portable), samples, &MeshSettings::default());
+    for backend in Backend::ALL {
+        assert_eq!(meshed(Mesher::with_backend(backend), samples, &MeshSettings::default()), plain);
+    }
+    assert!(Backend::Portable.is_available() && Backend::fastest().is_available());
+}
+
+#[test]
+fn slabs_that_do_not_fit_are_typed_errors() {
+    let settings = MeshSettings::default();
+    for size in [[1, 5], [5, 1], [0, 5], [u32::MAX; 2]] {
+        assert_eq!(SlabMesher::<i8>::new(size, settings).err(), Some(MeshError::SlabSize { size }));
+    }
+    let infinite = MeshSettings { isovalue: f32::INFINITY, ..settings };
+    assert_eq!(SlabMesher::<i8>::new([2; 2], infinite).err(), Some(MeshError::Isovalue { found: f32::INFINITY }));
+
+    let mut mesh = MeshBuffer::new();
+    let mut mesher = SlabMesher::<i8>::new([3, 2], settings).expect("the slabs have cells");
+    let refused = MeshError::SlabLength { size: [3, 2], expected: 6, found: 7 };
+    assert_eq!(mesher.push(&[1; 7], &mut mesh), Err(refused));
+    assert_eq!(mesher.clone().finish(&mut mesh), Err(MeshError::TooFewSlabs { found: 0 }));
+    mesher.push(&[1; 6], &mut mesh).expect("the slab is whole");
+    assert_eq!(mesher.clone().finish(&mut mesh), Err(MeshError::TooFewSlabs { found: 1 }));
+    mesher.push(&[-1; 6], &mut mesh).expect("the slab is whole");
+    mesher.finish(&mut mesh).expect("there are two slabs");
+    assert_eq!((mesh.positions.len(), mesh.triangle_count()), (6, 4));
+}
