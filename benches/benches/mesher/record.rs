@@ -2,6 +2,8 @@
 
 use std::{env, fs, path::Path, process::Command, process::ExitCode, thread};
 
+use marchless::Backend;
+
 use crate::{results::Results, threads::Threads};
 
 /// Prints the table, and writes it to `record/` where `MARCHLESS_RECORD=1` asks for it.
@@ -30,12 +32,14 @@ fn text(processor: &str, results: &Results, threads: Option<&Threads>) -> String
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let mut text = format!(
         "# {processor}\n\n\
-         {cores} cores, {}, marchless {}; `cargo bench -p marchless_benches --bench mesher`, one thread.\n\n\
-         Times are the least of 20 samples (10 from 128³ on). Columns after the triangles per second tell by what factor each peer takes longer on the same \
-         cells of the same `f32` samples: nets is fast-surface-nets 0.2.1, as it is and with its normals normalised; \
-         isosurface is 0.0.4, isomesh 0.0.14. The samples include one of padding on each side.\n\n{}",
+         {cores} cores, {}, marchless {} on its {} backend; `cargo bench -p marchless_benches --bench mesher`.\n\n\
+         One thread; times are the least of 20 samples (10 from 128³ on). Columns after the triangles per second tell by what \
+         factor each peer takes longer on the same cells of the same `f32` samples: nets is fast-surface-nets 0.2.1, as it \
+         is and with its normals normalised; isosurface is 0.0.4, isomesh 0.0.14. The samples include one of padding on \
+         each side.\n\n{}",
         compiler(),
         env!("CARGO_PKG_VERSION"),
+        Backend::fastest().name(),
         results.table(),
     );
     if let Some(threads) = threads {

@@ -78,9 +78,9 @@ impl Measured for f32 {
 
 /// All times of a run.
 #[derive(Default)]
-pub(crate) struct Results(Vec<Result>);
+pub(crate) struct Results(Vec<Timing>);
 
-struct Result {
+struct Timing {
     /// The case's field, extent and paper.
     case: (&'static str, String, Option<&'static str>),
     subject: Subject,
@@ -123,7 +123,7 @@ impl Results {
         let warm = times.len().saturating_sub(case.sample_size());
         if let Some(seconds) = times[warm..].iter().copied().reduce(f64::min) {
             let case = (case.field.name(), case.extent.clone(), case.paper);
-            self.0.push(Result { case, subject, seconds, triangles });
+            self.0.push(Timing { case, subject, seconds, triangles });
         }
     }
 
@@ -138,7 +138,7 @@ impl Results {
         }
     }
 
-    fn find(&self, field: &str, extent: &str, subject: Subject) -> Option<&Result> {
+    fn find(&self, field: &str, extent: &str, subject: Subject) -> Option<&Timing> {
         self.0.iter().find(|result| (result.case.0, &*result.case.1, result.subject) == (field, extent, subject))
     }
 
