@@ -29,7 +29,8 @@ def main():
     fields = build()
     vtk.vtkSMPTools.SetBackend("Sequential")
     vtk.vtkSMPTools.Initialize(1)
-    print(f"VTK {vtk.vtkVersion().GetVTKVersion()}, {vtk.vtkSMPTools.GetBackend()} backend; least (median) of the runs\n")
+    version, backend = vtk.vtkVersion().GetVTKVersion(), vtk.vtkSMPTools.GetBackend()
+    print(f"VTK {version}, {backend} backend; least (median) of the runs\n")
     print("| field       | samples | triangles | marchless              | VTK                    | ratio |")
     print("|-------------|---------|-----------|------------------------|------------------------|-------|")
     with tempfile.TemporaryDirectory() as folder:

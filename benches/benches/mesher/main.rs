@@ -3,20 +3,19 @@
 //! All boxes have a layer of padding, as chunks have: 35³ samples are 32³ cells. Everyone makes positions, normals and
 //! indices. What differs:
 //!
-//! - fast-surface-nets reads `[1; 3]..[size − 2; 3]` of the padded samples, through a shape known at compile time; its normals
-//!   are not of length 1, and it leaves the faces on one side of each border to the neighbour. It is timed as it is, and
-//!   with a pass that normalises its normals; ours are timed with normals, and without.
+//! - fast-surface-nets reads `[1; 3]..[size − 2; 3]` of the padded samples, through a shape known at compile time; its
+//!   normals are not of length 1, and it leaves the faces on one side of each border to the neighbour. It is timed as
+//!   it is, and with a pass that normalises its normals; ours are timed with normals, and without.
 //! - isomesh (marching cubes) and isosurface (0.0.4, marching cubes) ask a function for each sample; see `peers.rs`.
 //! - For fields without a surface, reading the samples once (all of them, xor) is what nobody can undercut by much.
 //!
-//! Terrains of 1³ to 50³ cells are those of William Svoboda, "Improving the Marching Cubes Algorithm for Use in Deformable 3D
-//! Terrain", table 1, whose times (C#, an Intel Core i5 of 3.5 GHz, no shared vertices) the table repeats for scale: another
-//! machine, another terrain.
+//! Terrains of 1³ to 50³ cells are those of William Svoboda, "Improving the Marching Cubes Algorithm for Use in
+//! Deformable 3D Terrain", table 1, whose times (C#, an Intel Core i5 of 3.5 GHz, no shared vertices) the table repeats
+//! for scale: another machine, another terrain.
 //!
-//! `cargo bench -p marchless_benches --bench mesher` runs for some seven minutes and ends with a table; names after `--`
-//! filter as ever, and the table shows what ran. With `MARCHLESS_RECORD=1` in the environment the table is also written
-//! to `record/`, under the processor's name. Times are the least of 20 samples (10
-//! from 128³ on).
+//! `cargo bench -p marchless_benches --bench mesher` runs for some seven minutes and ends with a table; names after
+//! `--` filter as ever, and the table shows what ran. With `MARCHLESS_RECORD=1` in the environment the table is also
+//! written to `record/`, under the processor's name. Times are the least of 20 samples (10 from 128³ on).
 
 mod case;
 mod peers;

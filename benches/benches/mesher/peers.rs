@@ -1,14 +1,14 @@
-//! The peers behind one shape of call: each takes the samples once, and then meshes them again and again into warm buffers,
-//! counting triangles.
+//! The peers behind one shape of call: each takes the samples once, and then meshes them again and again into warm
+//! buffers, counting triangles.
 //!
-//! isomesh and isosurface know no arrays: they ask a function for the value at a position. Both ask for the lattice points
-//! in order, x fastest, each once, so the function hands out the next sample of a copy without padding: no position is
-//! turned into an index. For the normal at a vertex they ask at its position; they get central differences at the
-//! nearest sample, the least that a table of samples can give (ours interpolate between the edge's two ends). isomesh
-//! normalises them; for isosurface, which does not, the function does.
+//! isomesh and isosurface know no arrays: they ask a function for the value at a position. Both ask for the lattice
+//! points in order, x fastest, each once, so the function hands out the next sample of a copy without padding: no
+//! position is turned into an index. For the normal at a vertex they ask at its position; they get central differences
+//! at the nearest sample, the least that a table of samples can give (ours interpolate between the edge's two ends).
+//! isomesh normalises them; for isosurface, which does not, the function does.
 //!
-//! isosurface meshes one layer of cells more than it is asked for (it gets the padding there), and shares only about half
-//! of the vertices that could be. Its 0.1.0-alpha.0 shares all, and takes 4 to 50 times as long.
+//! isosurface meshes one layer of cells more than it is asked for (it gets the padding there), and shares only about
+//! half of the vertices that could be. Its 0.1.0-alpha.0 shares all, and takes 4 to 50 times as long.
 
 use core::cell::Cell;
 

@@ -93,8 +93,9 @@ impl Results {
         self.0.is_empty()
     }
 
-    /// Lets criterion time `subject`, and keeps the least time. `prepare` runs only if a filter lets the subject through; what it
-    /// makes runs once a call, and returns a number that cannot be had without the work: the triangles, of meshers.
+    /// Lets criterion time `subject`, and keeps the least time. `prepare` runs only if a filter lets the subject
+    /// through; what it makes runs once a call, and returns a number that cannot be had without the work: the
+    /// triangles, of meshers.
     pub(crate) fn measure<R: FnMut() -> usize>(
         &mut self,
         group: &mut BenchmarkGroup<'_, WallTime>,

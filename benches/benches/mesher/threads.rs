@@ -1,7 +1,7 @@
 //! Many chunks on two threads, beside one thread and two independent processes.
 //!
-//! A worker has chunks, a mesher and a buffer of its own, and meshes all of its chunks some times over. The three ways take
-//! turns, so that what else the machine does meets them alike; two workers take as long as the slower one.
+//! A worker has chunks, a mesher and a buffer of its own, and meshes all of its chunks some times over. The three ways
+//! take turns, so that what else the machine does meets them alike; two workers take as long as the slower one.
 
 use core::fmt;
 use std::{
@@ -43,8 +43,8 @@ impl fmt::Display for Threads {
         let chunk = |seconds: f64| duration(seconds / (self.chunks * PASSES) as f64);
         write!(
             f,
-            "{} chunks of caves, {SAMPLES}³ samples of `i16`: {} a chunk on one thread, {} on each of two, {} in each of two \
-             processes. Two threads mesh {:.2} times what one does, and {:.2} of what two processes do.",
+            "{} chunks of caves, {SAMPLES}³ samples of `i16`: {} a chunk on one thread, {} on each of two, {} in each of \
+             two processes. Two threads mesh {:.2} times what one does, and {:.2} of what two processes do.",
             self.chunks,
             chunk(self.one_thread),
             chunk(self.two_threads),

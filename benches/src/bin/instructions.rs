@@ -2,8 +2,8 @@
 //! committed baseline. More than 3 % above it fails.
 //!
 //! `cargo run --release -p marchless_benches --bin instructions` measures and judges; with `-- --renew` it writes
-//! `benches/instructions.txt` instead, for a change that is worth what it costs, for one that made things faster, or for
-//! another compiler. Counts of another compiler than the baseline's are shown, but not judged.
+//! `benches/instructions.txt` instead, for a change that is worth what it costs, for one that made things faster, or
+//! for another compiler. Counts of another compiler than the baseline's are shown, but not judged.
 //!
 //! Four fields of 35³ and 64³ `i16` samples, padding included, with normals, on the portable and the AVX2 backend, each
 //! forced, into warm buffers. The fields are sampled before valgrind starts, since noise under valgrind takes long;
