@@ -190,9 +190,10 @@ pub(super) struct Window<'a, W> {
 /// What is remembered from slab to slab.
 #[derive(Clone, Debug)]
 pub(super) struct Slabs {
-    /// The signs of the slab before, and of the newest one.
-    signs: [Signs; 2],
-    /// The first vertices of the newest slab on edges along x and y.
+    /// The signs of the slab before, of the slab itself, and of the next one: that is read early, in one go, so that the gradients, which
+    /// need a sample of it here and there, find it in the cache.
+    signs: [Signs; 3],
+    /// The first vertices of the slab before on edges along x and y.
     first: [u64; 2],
     /// All vertices so far.
     vertices: u64,
@@ -200,18 +201,19 @@ pub(super) struct Slabs {
 
 impl Slabs {
     pub(super) const fn new() -> Self {
-        Self { signs: [Signs::new(), Signs::new()], first: [0; 2], vertices: 0 }
+        Self { signs: [Signs::new(), Signs::new(), Signs::new()], first: [0; 2], vertices: 0 }
     }
 
     /// Takes in the next slab: makes the vertices on edges from the slab before and on those within the slab, and the
     /// triangles in between. Of the first slab (of a volume or a part of it) there is no slab before; of the last one of a part, the
-    /// vertices within belong to the next part and are not made.
+    /// vertices within belong to the next part and are not made. `next`: the slab that will come next, if any.
     #[inline(always)]
     pub(super) fn step<S: Simd, W: Weight>(
         &mut self,
         lattice: &Lattice,
         window: &Window<'_, W>,
         place: Place,
+        next: Option<&[W]>,
         settings: &MeshSettings,
         pass: &mut Vertices<W>,
         out: &mut MeshBuffer,
@@ -220,9 +222,15 @@ impl Slabs {
             self.vertices = 0;
         }
         let [_, low, slab, above] = window.slabs;
-        let [before, newest] = &mut self.signs;
-        core::mem::swap(before, newest);
-        newest.fill::<S, W>(lattice, slab, W::threshold(settings.isovalue));
+        let threshold = W::threshold(settings.isovalue);
+        self.signs.rotate_left(1);
+        let [before, newest, following] = &mut self.signs;
+        if place == Place::First {
+            newest.fill::<S, W>(lattice, slab, threshold);
+        }
+        if let Some(next) = next {
+            following.fill::<S, W>(lattice, next, threshold);
+        }
         let joined = place != Place::First && (before.uniform().is_none() || before.uniform() != newest.uniform());
         let mut first =
             FirstVertices { x: [self.first[0] as u32, 0], y: [self.first[1] as u32, 0], z: self.vertices as u32 };
@@ -245,11 +253,11 @@ impl Slabs {
                 materials: window.materials.map(|[_, materials]| [materials; 2]),
                 z: window.z,
             };
-            let (signs, next) = (newest.signs(), newest.next());
+            let (signs, neighbours) = (newest.signs(), newest.next());
             if place == Place::Last {
-                self.first[1] += triangles::crossings(signs, next);
+                self.first[1] += triangles::crossings(signs, neighbours);
             } else {
-                self.vertices += pass.place::<S, 0>(lattice, &planes, settings, signs, next, out);
+                self.vertices += pass.place::<S, 0>(lattice, &planes, settings, signs, neighbours, out);
                 self.first[1] = self.vertices;
                 let below_last_row = &signs[..signs.len() - lattice.words];
                 self.vertices +=
@@ -306,7 +314,8 @@ impl<W: Weight> Job for Part<'_, W> {
                 Place::Next
             };
             let window = Window::of(&samples, &lattice, z);
-            slabs.step::<S, W>(&lattice, &window, place, settings, &mut pass, out)?;
+            let next = (z < cells.end).then_some(window.slabs[3]);
+            slabs.step::<S, W>(&lattice, &window, place, next, settings, &mut pass, out)?;
         }
         pass.bounds.widen(out);
         Ok(())
@@ -317,6 +326,8 @@ impl<W: Weight> Job for Part<'_, W> {
 pub(super) struct NextSlab<'a, W> {
     pub(super) lattice: &'a Lattice,
     pub(super) window: Window<'a, W>,
+    /// Whether another one will come.
+    pub(super) has_next: bool,
     pub(super) settings: &'a MeshSettings,
     pub(super) slabs: &'a mut Slabs,
     pub(super) out: &'a mut MeshBuffer,
@@ -327,10 +338,11 @@ impl<W: Weight> Job for NextSlab<'_, W> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Self::Output {
-        let Self { lattice, window, settings, slabs, out } = self;
+        let Self { lattice, window, has_next, settings, slabs, out } = self;
         let place = if window.z == 0 { Place::First } else { Place::Next };
+        let next = has_next.then_some(window.slabs[3]);
         let mut pass = Vertices::new();
-        slabs.step::<S, W>(lattice, &window, place, settings, &mut pass, out)?;
+        slabs.step::<S, W>(lattice, &window, place, next, settings, &mut pass, out)?;
         pass.bounds.widen(out);
         Ok(())
     }

@@ -102,6 +102,6 @@ impl<W: Weight> SlabMesher<W> {
             one_sided: [z <= 1, z == 0 || z == last],
         };
         let (lattice, settings, slabs) = (&self.lattice, &self.settings, &mut self.slabs);
-        dispatch(self.backend, NextSlab { lattice, window, settings, slabs, out })
+        dispatch(self.backend, NextSlab { lattice, window, has_next: z < last, settings, slabs, out })
     }
 }
