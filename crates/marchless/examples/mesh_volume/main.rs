@@ -14,7 +14,6 @@ mod input;
 mod npy;
 mod output;
 mod sample;
-mod slabs;
 mod stream;
 mod transform;
 

@@ -3,14 +3,13 @@
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use marchless::{MeshBuffer, MeshSettings};
+use marchless::{MeshBuffer, MeshSettings, SlabMesher};
 
 use crate::Stop;
 use crate::error::Error;
 use crate::input::Volume;
 use crate::output::Output;
 use crate::sample::{Sample, SampleType};
-use crate::slabs::SlabMesher;
 use crate::transform::Transform;
 
 /// What came of it.
@@ -18,9 +17,13 @@ use crate::transform::Transform;
 pub(crate) struct Totals {
     pub(crate) vertices: u64,
     pub(crate) triangles: u64,
-    /// How long reading, meshing and writing took.
+    /// How long [`READING`], [`MESHING`] and [`WRITING`] took.
     pub(crate) times: [Duration; 3],
 }
+
+const READING: usize = 0;
+const MESHING: usize = 1;
+const WRITING: usize = 2;
 
 /// Meshes the whole volume and puts the output in its place.
 ///
@@ -49,7 +52,7 @@ fn stream_as<S: Sample>(
     volume: &mut Volume,
     iso: f64,
     transform: &Transform,
-    mut output: Output,
+    output: Output,
     stop: &Stop,
 ) -> Result<Totals, Error> {
     let slab = volume.slab();
@@ -57,36 +60,61 @@ fn stream_as<S: Sample>(
     let settings = MeshSettings { isovalue: S::isovalue(iso), normals: true };
     let mut mesher = SlabMesher::new(slab, settings).map_err(|source| volume.error(source))?;
     let mut mesh = MeshBuffer::new();
-    let mut totals = Totals::default();
-    let mut clock = Instant::now();
-    let mut lap = |time: &mut Duration| *time += std::mem::replace(&mut clock, Instant::now()).elapsed();
+    let mut sink = Sink { transform, output, stop, totals: Totals::default(), since: Instant::now() };
 
     let progress = progress_bar(volume.slabs());
-    for slab in 0..=volume.slabs() {
-        stop.check()?;
-        if slab < volume.slabs() {
-            volume.read(&mut bytes)?;
-            weights.clear();
-            S::decode(&bytes, iso, &mut weights);
-            lap(&mut totals.times[0]);
-            mesher.push(&weights, &mut mesh).map_err(|source| volume.error(source))?;
-        } else {
-            mesher.finish(&mut mesh).map_err(|source| volume.error(source))?;
-        }
-        transform.apply(&mut mesh);
-        lap(&mut totals.times[1]);
-
-        totals.vertices += mesh.positions.len() as u64;
-        totals.triangles += mesh.triangle_count() as u64;
-        output.append(&mesh)?;
-        mesh.clear();
-        lap(&mut totals.times[2]);
+    for _ in 0..volume.slabs() {
+        volume.read(&mut bytes)?;
+        weights.clear();
+        S::decode(&bytes, iso, &mut weights);
+        sink.spent(READING);
+        mesher.push(&weights, &mut mesh).map_err(|source| volume.error(source))?;
+        sink.take(&mut mesh)?;
         progress.inc(1);
     }
-    output.finish(stop)?;
-    lap(&mut totals.times[2]);
+    mesher.finish(&mut mesh).map_err(|source| volume.error(source))?;
+    sink.take(&mut mesh)?;
+    let totals = sink.finish()?;
     progress.finish_and_clear();
     Ok(totals)
+}
+
+/// Where pieces of the mesh go, and what is counted on the way.
+struct Sink<'a> {
+    transform: &'a Transform,
+    output: Output,
+    stop: &'a Stop,
+    totals: Totals,
+    /// Up to when time has been accounted for.
+    since: Instant,
+}
+
+impl Sink<'_> {
+    /// Takes a piece out of `mesh`.
+    fn take(&mut self, mesh: &mut MeshBuffer) -> Result<(), Error> {
+        self.transform.apply(mesh);
+        self.spent(MESHING);
+        self.totals.vertices += mesh.positions.len() as u64;
+        self.totals.triangles += mesh.triangle_count() as u64;
+        self.output.append(mesh)?;
+        mesh.clear();
+        self.spent(WRITING);
+        self.stop.check()
+    }
+
+    fn finish(self) -> Result<Totals, Error> {
+        let Self { output, stop, mut totals, since, .. } = self;
+        output.finish(stop)?;
+        totals.times[WRITING] += since.elapsed();
+        Ok(totals)
+    }
+
+    /// Counts the time that has passed since the last call as `part`.
+    fn spent(&mut self, part: usize) {
+        let now = Instant::now();
+        self.totals.times[part] += now - self.since;
+        self.since = now;
+    }
 }
 
 /// Room for a slab as bytes and as weights.
@@ -104,5 +132,5 @@ fn buffers<S: Sample>([a, b]: [u32; 2], sample_type: SampleType) -> Result<(Vec<
 /// Shown while standard error is a terminal.
 fn progress_bar(slabs: u32) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} to go");
-    ProgressBar::new(u64::from(slabs) + 1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    ProgressBar::new(u64::from(slabs)).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

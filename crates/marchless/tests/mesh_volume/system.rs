@@ -156,7 +156,6 @@ mod unix {
 
     #[test]
     #[cfg(target_os = "linux")]
-    #[ignore = "waits for the mesher that is fed slab by slab"]
     fn a_volume_may_be_larger_than_memory() {
         mesh_in(64, 512, 20);
     }
