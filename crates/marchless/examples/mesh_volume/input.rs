@@ -75,7 +75,12 @@ impl Volume {
     /// # Errors
     /// [`Error::Read`], also where the file has become shorter.
     pub(crate) fn read(&mut self, bytes: &mut [u8]) -> Result<(), Error> {
-        self.file.read_exact(bytes).map_err(|source| self.cannot_be_read(source))
+        self.file.read_exact(bytes).map_err(|source| match source.kind() {
+            io::ErrorKind::UnexpectedEof => {
+                self.cannot_be_read(io::Error::other("it has become shorter while it was read"))
+            }
+            _ => self.cannot_be_read(source),
+        })
     }
 
     pub(crate) fn error(&self, source: marchless::MeshError) -> Error {
