@@ -69,6 +69,15 @@ pub(crate) mod private {
         /// Twice the difference, for gradients at an open border.
         fn doubled(difference: Self::Wide) -> Self::Wide;
         fn to_f32(wide: Self::Wide) -> f32;
+        /// Two weights, such that vector instructions take many of them apart with ease.
+        type Pair: Copy + Default;
+        fn pair(weights: [Self; 2]) -> Self::Pair;
+        fn both(pair: Self::Pair) -> [Self; 2];
+        /// The same of four weights, in two places.
+        type Left: Copy + Default;
+        type Right: Copy + Default;
+        fn split(weights: [Self; 4]) -> (Self::Left, Self::Right);
+        fn joined(left: Self::Left, right: Self::Right) -> [Self; 4];
         /// How far along the edge from `a` to `b` the isovalue lies, before clamping, and whether it is so: where it is
         /// not, [`Sealed::fraction`] knows. Has no branch. `isovalue`: in steps (voxels × `SCALE`).
         fn quick_fraction(a: Self::Wide, b: Self::Wide, isovalue: f32) -> (f32, bool);
@@ -81,7 +90,7 @@ pub(crate) mod private {
 }
 
 macro_rules! integer_weight {
-    ($type:ty, $scale:literal, $below:ident) => {
+    ($type:ty, $scale:literal, $below:ident, $pair:ty) => {
         impl Weight for $type {
             const SCALE: f32 = $scale;
             const OUTSIDE: Self = <$type>::MAX;
@@ -152,6 +161,32 @@ macro_rules! integer_weight {
                 wide as f32
             }
 
+            type Pair = $pair;
+
+            #[inline(always)]
+            fn pair([a, b]: [Self; 2]) -> $pair {
+                <$pair>::from(a.cast_unsigned()) | <$pair>::from(b.cast_unsigned()) << Self::BITS
+            }
+
+            #[inline(always)]
+            fn both(pair: $pair) -> [Self; 2] {
+                [pair as Self, (pair >> Self::BITS) as Self]
+            }
+
+            type Left = $pair;
+            type Right = $pair;
+
+            #[inline(always)]
+            fn split([a, b, c, d]: [Self; 4]) -> ($pair, $pair) {
+                (Self::pair([a, b]), Self::pair([c, d]))
+            }
+
+            #[inline(always)]
+            fn joined(left: $pair, right: $pair) -> [Self; 4] {
+                let ([a, b], [c, d]) = (Self::both(left), Self::both(right));
+                [a, b, c, d]
+            }
+
             #[inline(always)]
             fn quick_fraction(a: i32, b: i32, isovalue: f32) -> (f32, bool) {
                 let (a, b) = (a as f32, b as f32);
@@ -170,8 +205,8 @@ macro_rules! integer_weight {
     };
 }
 
-integer_weight!(i8, 32.0, below_i8);
-integer_weight!(i16, 256.0, below_i16);
+integer_weight!(i8, 32.0, below_i8, u16);
+integer_weight!(i16, 256.0, below_i16, u32);
 
 impl Weight for f32 {
     const SCALE: f32 = 1.0;
@@ -224,6 +259,31 @@ impl private::Sealed for f32 {
     #[inline(always)]
     fn to_f32(wide: f32) -> f32 {
         wide
+    }
+
+    type Pair = [f32; 2];
+
+    #[inline(always)]
+    fn pair(weights: [Self; 2]) -> [f32; 2] {
+        weights
+    }
+
+    #[inline(always)]
+    fn both(pair: [f32; 2]) -> [Self; 2] {
+        pair
+    }
+
+    type Left = [f32; 4];
+    type Right = ();
+
+    #[inline(always)]
+    fn split(weights: [Self; 4]) -> ([f32; 4], ()) {
+        (weights, ())
+    }
+
+    #[inline(always)]
+    fn joined(left: [f32; 4], (): ()) -> [Self; 4] {
+        left
     }
 
     #[inline(always)]

@@ -94,64 +94,35 @@ impl Lattice {
         (word / words, 64 * (word % words))
     }
 
-    /// Twice the gradient at the meshed sample at `x`, `y` with index `index`, from its slab and those `below` and `above` it.
-    ///
-    /// # Safety
-    /// `x` and `y` are less than the size, and the slabs are whole.
-    #[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
-    #[inline(always)]
-    pub(super) unsafe fn gradient<W: Weight, const PADDED: bool>(
-        &self,
-        [below, slab, above]: [&[W]; 3],
-        one_sided_z: bool,
-        index: usize,
-        x: u32,
-        y: u32,
-    ) -> [W::Wide; 3] {
-        let ([low, high], one_sided) = if PADDED {
-            ([[index - 1, index - self.stride], [index + 1, index + self.stride]], [false; 2])
-        } else {
-            self.neighbours(index, x, y)
-        };
-        // SAFETY: the sample's neighbours are in the slab, too, or it stands in for them.
-        let [dx, dy, dz] = unsafe {
-            [
-                W::difference(at(slab, high[0]), at(slab, low[0])),
-                W::difference(at(slab, high[1]), at(slab, low[1])),
-                W::difference(at(above, index), at(below, index)),
-            ]
-        };
-        if PADDED {
-            return [dx, dy, dz];
-        }
-        [
-            if one_sided[0] { W::doubled(dx) } else { dx },
-            if one_sided[1] { W::doubled(dy) } else { dy },
-            if one_sided_z { W::doubled(dz) } else { dz },
-        ]
+    /// Twice the gradient at an end of an edge.
+    pub(super) fn gradient<W: Weight>(&self, end: &End<'_, W>) -> [W::Wide; 3] {
+        self.differences(end, |high, low| W::difference(high, low), W::doubled)
     }
 
     /// The same, where differences may overflow.
-    pub(super) fn steady_gradient<W: Weight>(
+    pub(super) fn steady_gradient<W: Weight>(&self, end: &End<'_, W>) -> [f64; 3] {
+        self.differences(end, |high, low| high.finite() - low.finite(), |difference| difference * 2.0)
+    }
+
+    fn differences<W: Copy, D: Copy>(
         &self,
-        [below, slab, above]: [&[W]; 3],
-        one_sided_z: bool,
-        at: usize,
-        x: u32,
-        y: u32,
-    ) -> [f64; 3] {
-        let ([low, high], one_sided) = self.neighbours(at, x, y);
+        end: &End<'_, W>,
+        difference: impl Fn(W, W) -> D,
+        doubled: impl Fn(D) -> D,
+    ) -> [D; 3] {
+        let [below, slab, above] = end.slabs;
+        let at = self.index(end.x, end.y);
+        let ([low, high], one_sided) = self.neighbours(at, end.x, end.y);
         let differences = [
-            slab[high[0]].finite() - slab[low[0]].finite(),
-            slab[high[1]].finite() - slab[low[1]].finite(),
-            above[at].finite() - below[at].finite(),
+            difference(slab[high[0]], slab[low[0]]),
+            difference(slab[high[1]], slab[low[1]]),
+            difference(above[at], below[at]),
         ];
-        let one_sided = [one_sided[0], one_sided[1], one_sided_z];
-        core::array::from_fn(|k| if one_sided[k] { differences[k] * 2.0 } else { differences[k] })
+        let one_sided = [one_sided[0], one_sided[1], end.one_sided];
+        core::array::from_fn(|k| if one_sided[k] { doubled(differences[k]) } else { differences[k] })
     }
 
     /// The indices of a sample's lower and higher neighbours along x and y, and whether it is one of them itself.
-    #[inline(always)]
     fn neighbours(&self, at: usize, x: u32, y: u32) -> ([[usize; 2]; 2], [bool; 2]) {
         let first = [!self.padded && x == 0, !self.padded && y == 0];
         let last = [!self.padded && x as usize + 1 == self.size[0], !self.padded && y as usize + 1 == self.size[1]];
@@ -159,6 +130,16 @@ impl Lattice {
         let high = [at + usize::from(!last[0]), at + if last[1] { 0 } else { self.stride }];
         ([low, high], [first[0] | last[0], first[1] | last[1]])
     }
+}
+
+/// An end of an edge, and where to find what its gradient is made of.
+pub(super) struct End<'a, W> {
+    /// The slab below, its own, and the one above.
+    pub(super) slabs: [&'a [W]; 3],
+    /// Whether the gradient along z is one-sided.
+    pub(super) one_sided: bool,
+    pub(super) x: u32,
+    pub(super) y: u32,
 }
 
 /// The sample of a slab at `index`.

@@ -78,9 +78,8 @@ pub(super) fn join<S: Simd>(
             let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
             let room = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
             gathered += S::cases(corners, active[i % 64], room);
-            if (start + i + 1) % words == 0 && active[i % 64] & last_bit != 0 {
-                codes[gathered - 1] += CLOSING;
-            }
+            let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
+            codes[gathered - 1] += if ends_row && active[i % 64] & last_bit != 0 { CLOSING } else { 0 };
             if gathered >= GATHERED {
                 flush::<S>(&codes[..gathered], &mut counters, indices);
                 gathered = 0;

@@ -8,7 +8,7 @@ use core::mem::MaybeUninit;
 use super::{
     MeshSettings,
     output::{Bounds, keep, room},
-    slabs::{Lattice, at},
+    slabs::{End, Lattice, at},
 };
 use crate::{
     buffer::MeshBuffer,
@@ -40,28 +40,35 @@ pub(super) struct Planes<'a, W> {
 }
 
 /// Gathers crossings and turns them into vertices.
+///
+/// What a vertex is made of is copied from the samples in as few pieces as possible: four neighbours along x at once, or two; the arithmetic
+/// is left to [`Vertices::finish`].
 pub(super) struct Vertices<W: Weight> {
     /// Of all vertices made.
     pub(super) bounds: Bounds,
-    gathered: usize,
     x: [u32; ROOM],
     y: [u32; ROOM],
-    /// The weights at the edges' ends.
-    ends: [[W::Wide; ROOM]; 2],
-    /// Twice the gradients there.
-    gradients: [[[W::Wide; ROOM]; 3]; 2],
+    /// The samples around the low and the high end along x, from one below the end on. (On an edge along x, the high
+    /// end is in the low one's.)
+    rows: [([W::Left; ROOM], [W::Right; ROOM]); 2],
+    /// On an edge along x: the neighbours of both ends below along y, above along y, below along z, above along z.
+    pairs: [[W::Pair; ROOM]; 4],
+    /// On other edges: the sample below the low end, and the one above the high end.
+    outer: [[W; ROOM]; 2],
+    /// On edges along y and z: twice the gradient along the other of the two, at both ends.
+    across: [[W::Wide; ROOM]; 2],
 }
 
 impl<W: Weight> Vertices<W> {
     pub(super) fn new() -> Self {
-        let none = [W::Wide::default(); ROOM];
         Self {
             bounds: Bounds::NONE,
-            gathered: 0,
             x: [0; ROOM],
             y: [0; ROOM],
-            ends: [none; 2],
-            gradients: [[none; 3]; 2],
+            rows: [([W::Left::default(); ROOM], [W::Right::default(); ROOM]); 2],
+            pairs: [[W::Pair::default(); ROOM]; 4],
+            outer: [[W::OUTSIDE; ROOM]; 2],
+            across: [[W::Wide::default(); ROOM]; 2],
         }
     }
 
@@ -76,8 +83,7 @@ impl<W: Weight> Vertices<W> {
         high: &[u64],
         out: &mut MeshBuffer,
     ) -> u64 {
-        let mut made = 0;
-        let mut crossed = [0; 64];
+        let (mut made, mut gathered, mut crossed) = (0, 0, [0; 64]);
         for (block, (low, high)) in low.chunks(64).zip(high.chunks(64)).enumerate() {
             for (crossed, (low, high)) in crossed.iter_mut().zip(low.iter().zip(high)) {
                 *crossed = low ^ high;
@@ -87,16 +93,20 @@ impl<W: Weight> Vertices<W> {
                 let word = words.trailing_zeros() as usize;
                 words &= words - 1;
                 let (y, x) = lattice.place_of(64 * block + word);
-                let (xs, ys) = (&mut self.x[self.gathered..], &mut self.y[self.gathered..]);
-                let (xs, ys) =
-                    xs.first_chunk_mut().zip(ys.first_chunk_mut()).expect("there is room for another word's");
-                self.gathered += S::positions(crossed[word % 64], x, y, xs, ys);
-                if self.gathered >= GATHERED {
-                    made += self.flush::<AXIS>(lattice, planes, settings, out);
+                let (xs, ys) = (self.x[gathered..].first_chunk_mut(), self.y[gathered..].first_chunk_mut());
+                let (xs, ys) = xs.zip(ys).expect("there is room for another word's");
+                gathered += S::positions(crossed[word % 64], x, y, xs, ys);
+                if gathered >= GATHERED {
+                    self.flush::<AXIS>(lattice, planes, settings, gathered, out);
+                    made += gathered;
+                    gathered = 0;
                 }
             }
         }
-        made + self.flush::<AXIS>(lattice, planes, settings, out)
+        if gathered > 0 {
+            self.flush::<AXIS>(lattice, planes, settings, gathered, out);
+        }
+        (made + gathered) as u64
     }
 
     #[inline(always)]
@@ -105,26 +115,25 @@ impl<W: Weight> Vertices<W> {
         lattice: &Lattice,
         planes: &Planes<'_, W>,
         settings: &MeshSettings,
+        count: usize,
         out: &mut MeshBuffer,
-    ) -> u64 {
-        let count = self.gathered;
-        self.gathered = 0;
-        if count == 0 {
-            return 0;
-        }
+    ) {
         if lattice.padded {
-            self.gather::<AXIS, true>(lattice, planes, settings, count);
+            self.gather::<AXIS, true>(lattice, planes, count);
         } else {
-            self.gather::<AXIS, false>(lattice, planes, settings, count);
+            self.gather::<AXIS, false>(lattice, planes, count);
         }
-        let isovalue = settings.isovalue * W::SCALE;
         let side_by_side = count.next_multiple_of(16);
         let positions = &mut room(&mut out.positions, side_by_side)[..side_by_side];
-        let sound = if settings.normals {
-            let normals = &mut room(&mut out.normals, side_by_side)[..side_by_side];
-            self.finish::<AXIS, true>(planes.z, isovalue, count, positions, normals)
+        let sound = if !settings.normals {
+            self.finish::<AXIS, false, true>(lattice, planes, settings, count, positions, &mut [])
         } else {
-            self.finish::<AXIS, false>(planes.z, isovalue, count, positions, &mut [])
+            let normals = &mut room(&mut out.normals, side_by_side)[..side_by_side];
+            if lattice.padded {
+                self.finish::<AXIS, true, true>(lattice, planes, settings, count, positions, normals)
+            } else {
+                self.finish::<AXIS, true, false>(lattice, planes, settings, count, positions, normals)
+            }
         };
         if !sound {
             self.mend::<AXIS>(lattice, planes, settings, count, out);
@@ -148,44 +157,59 @@ impl<W: Weight> Vertices<W> {
                 }
             }));
         }
-        count as u64
     }
 
-    /// Copies what the first `count` vertices are made of.
+    /// Copies what the first `count` vertices are made of. Without padding, samples beyond the border are made up.
     #[inline(always)]
     fn gather<const AXIS: usize, const PADDED: bool>(
         &mut self,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
-        settings: &MeshSettings,
         count: usize,
     ) {
         let [below, low, high, above] = planes.slabs;
         assert!(planes.slabs.iter().all(|slab| slab.len() == lattice.len), "all slabs are whole");
-        // Along z an end's neighbours lie in other slabs.
-        let (next_to_low, next_to_high) = if AXIS == 2 { (high, low) } else { (above, below) };
-        let [one_sided_low, one_sided_high] = planes.one_sided;
         let (xs, ys) = (&self.x[..count], &self.y[..count]);
-        let [low_ends, high_ends] = &mut self.ends;
-        let (low_ends, high_ends) = (&mut low_ends[..count], &mut high_ends[..count]);
-        let [[ax, ay, az], [bx, by, bz]] = &mut self.gradients;
-        let (ax, ay, az) = (&mut ax[..count], &mut ay[..count], &mut az[..count]);
-        let (bx, by, bz) = (&mut bx[..count], &mut by[..count], &mut bz[..count]);
+        let [(low_left, low_right), (high_left, high_right)] = &mut self.rows;
+        let (low_left, low_right) = (&mut low_left[..count], &mut low_right[..count]);
+        let (high_left, high_right) = (&mut high_left[..count], &mut high_right[..count]);
+        let [y_below, y_above, z_below, z_above] = &mut self.pairs;
+        let (y_below, y_above) = (&mut y_below[..count], &mut y_above[..count]);
+        let (z_below, z_above) = (&mut z_below[..count], &mut z_above[..count]);
+        let [outer_low, outer_high] = &mut self.outer;
+        let (outer_low, outer_high) = (&mut outer_low[..count], &mut outer_high[..count]);
+        let [across_low, across_high] = &mut self.across;
+        let (across_low, across_high) = (&mut across_low[..count], &mut across_high[..count]);
         for i in 0..count {
             let (x, y) = (xs[i], ys[i]);
             let a = lattice.index(x, y);
             let b = a + lattice.step::<AXIS>();
-            let (xb, yb) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
-            // SAFETY: the slabs are whole, and both ends of a crossing are meshed samples.
+            let y_high = y + u32::from(AXIS == 1);
+            // SAFETY: the slabs are whole, both ends of a crossing are meshed samples, and where samples beside them are
+            // beyond an open border, the ends stand in for those.
             #[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
             unsafe {
-                low_ends[i] = at(low, a).wide();
-                high_ends[i] = at(high, b).wide();
-                if settings.normals {
-                    [ax[i], ay[i], az[i]] =
-                        lattice.gradient::<W, PADDED>([below, low, next_to_low], one_sided_low, a, x, y);
-                    [bx[i], by[i], bz[i]] =
-                        lattice.gradient::<W, PADDED>([next_to_high, high, above], one_sided_high, b, xb, yb);
+                let down = |index: usize, y: u32| if PADDED || y > 0 { index - lattice.stride } else { index };
+                let up = |index: usize, y: u32| {
+                    if PADDED || (y as usize + 1) < lattice.size[1] { index + lattice.stride } else { index }
+                };
+                (low_left[i], low_right[i]) = four::<W, PADDED>(lattice, low, a, x);
+                if AXIS == 0 {
+                    y_below[i] = two(low, down(a, y));
+                    y_above[i] = two(low, up(a, y));
+                    z_below[i] = two(below, a);
+                    z_above[i] = two(above, a);
+                } else {
+                    (high_left[i], high_right[i]) = four::<W, PADDED>(lattice, high, b, x);
+                    if AXIS == 1 {
+                        (outer_low[i], outer_high[i]) = (at(low, down(a, y)), at(high, up(b, y_high)));
+                        across_low[i] = W::difference(at(above, a), at(below, a));
+                        across_high[i] = W::difference(at(above, b), at(below, b));
+                    } else {
+                        (outer_low[i], outer_high[i]) = (at(below, a), at(above, b));
+                        across_low[i] = W::difference(at(low, up(a, y)), at(low, down(a, y)));
+                        across_high[i] = W::difference(at(high, up(b, y)), at(high, down(b, y)));
+                    }
                 }
             }
         }
@@ -194,20 +218,30 @@ impl<W: Weight> Vertices<W> {
     /// Computes the vertices from what was gathered, into slices of the next multiple of 16 of `count`. Returns whether all of them are sound;
     /// where they are not, a difference was out of the range in which `f32` computes well.
     #[inline(always)]
-    fn finish<const AXIS: usize, const NORMALS: bool>(
+    fn finish<const AXIS: usize, const NORMALS: bool, const PADDED: bool>(
         &mut self,
-        z: usize,
-        isovalue: f32,
+        lattice: &Lattice,
+        planes: &Planes<'_, W>,
+        settings: &MeshSettings,
         count: usize,
         positions: &mut [MaybeUninit<[f32; 3]>],
         normals: &mut [MaybeUninit<[f32; 3]>],
     ) -> bool {
-        let z = z as f32;
+        let (z, isovalue) = (planes.z as f32, settings.isovalue * W::SCALE);
+        let [last_x, last_y] = [0, 1].map(|axis| (lattice.size[axis] - 1) as u32);
+        let [z_low, z_high] = planes.one_sided.map(|one_sided| if one_sided { 2.0 } else { 1.0 });
         let room = positions.len();
-        let (a, b, xs, ys) = (&self.ends[0][..room], &self.ends[1][..room], &self.x[..room], &self.y[..room]);
-        let [ax, ay, az] = &self.gradients[0];
-        let [bx, by, bz] = &self.gradients[1];
-        let (ax, ay, az, bx, by, bz) = (&ax[..room], &ay[..room], &az[..room], &bx[..room], &by[..room], &bz[..room]);
+        let (xs, ys) = (&self.x[..room], &self.y[..room]);
+        let [(low_left, low_right), (high_left, high_right)] = &self.rows;
+        let (low_left, low_right) = (&low_left[..room], &low_right[..room]);
+        let (high_left, high_right) = (&high_left[..room], &high_right[..room]);
+        let [y_below, y_above, z_below, z_above] = &self.pairs;
+        let (y_below, y_above) = (&y_below[..room], &y_above[..room]);
+        let (z_below, z_above) = (&z_below[..room], &z_above[..room]);
+        let [outer_low, outer_high] = &self.outer;
+        let (outer_low, outer_high) = (&outer_low[..room], &outer_high[..room]);
+        let [across_low, across_high] = &self.across;
+        let (across_low, across_high) = (&across_low[..room], &across_high[..room]);
         if NORMALS {
             assert_eq!(normals.len(), room);
         }
@@ -215,7 +249,10 @@ impl<W: Weight> Vertices<W> {
         let mut unsound = false;
         for i in 0..room {
             let within = i < count;
-            let (fraction, mut sound) = W::quick_fraction(a[i], b[i], isovalue);
+            let row = W::joined(low_left[i], low_right[i]);
+            let high_row = W::joined(high_left[i], high_right[i]);
+            let (a, b) = (row[1], if AXIS == 0 { row[2] } else { high_row[1] });
+            let (fraction, mut sound) = W::quick_fraction(a.wide(), b.wide(), isovalue);
             let fraction = clamped(fraction);
             let mut position = [xs[i] as f32, ys[i] as f32, z];
             position[AXIS] += fraction;
@@ -229,9 +266,40 @@ impl<W: Weight> Vertices<W> {
                 axis += 1;
             }
             if NORMALS {
-                let x = mixed::<W>(ax[i], bx[i], fraction);
-                let y = mixed::<W>(ay[i], by[i], fraction);
-                let z = mixed::<W>(az[i], bz[i], fraction);
+                // Twice the gradients at both ends.
+                let mut ax = W::to_f32(W::difference(row[2], row[0]));
+                let mut bx = if AXIS == 0 {
+                    W::to_f32(W::difference(row[3], row[1]))
+                } else {
+                    W::to_f32(W::difference(high_row[2], high_row[0]))
+                };
+                let (mut ay, mut by, mut az, mut bz);
+                if AXIS == 0 {
+                    let (below, above) = (W::both(y_below[i]), W::both(y_above[i]));
+                    ay = W::to_f32(W::difference(above[0], below[0]));
+                    by = W::to_f32(W::difference(above[1], below[1]));
+                    let (below, above) = (W::both(z_below[i]), W::both(z_above[i]));
+                    az = W::to_f32(W::difference(above[0], below[0]));
+                    bz = W::to_f32(W::difference(above[1], below[1]));
+                } else {
+                    let a_along = W::to_f32(W::difference(b, outer_low[i]));
+                    let b_along = W::to_f32(W::difference(outer_high[i], a));
+                    let (a_across, b_across) = (W::to_f32(across_low[i]), W::to_f32(across_high[i]));
+                    (ay, by, az, bz) = if AXIS == 1 {
+                        (a_along, b_along, a_across, b_across)
+                    } else {
+                        (a_across, b_across, a_along, b_along)
+                    };
+                }
+                if !PADDED {
+                    ax *= span(xs[i], last_x);
+                    bx *= span(xs[i] + u32::from(AXIS == 0), last_x);
+                    ay *= span(ys[i], last_y);
+                    by *= span(ys[i] + u32::from(AXIS == 1), last_y);
+                    az *= z_low;
+                    bz *= z_high;
+                }
+                let (x, y, z) = (mixed(ax, bx, fraction), mixed(ay, by, fraction), mixed(az, bz, fraction));
                 let squared = x * x + y * y + z * z;
                 sound &= is_sound(squared);
                 let scale = 1.0 / sqrt(squared);
@@ -259,32 +327,73 @@ impl<W: Weight> Vertices<W> {
     ) {
         let [below, low, high, above] = planes.slabs;
         let (next_to_low, next_to_high) = if AXIS == 2 { (high, low) } else { (above, below) };
-        for i in 0..count {
-            let (x, y) = (self.x[i], self.y[i]);
-            let a = lattice.index(x, y);
-            let b = a + lattice.step::<AXIS>();
-            let (xb, yb) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
-            let fraction = crossing_fraction(low[a], high[b], settings.isovalue * W::SCALE);
+        for (vertex, (&x, &y)) in self.x[..count].iter().zip(&self.y).enumerate() {
+            let (x_high, y_high) = (x + u32::from(AXIS == 0), y + u32::from(AXIS == 1));
+            let (a, b) = (low[lattice.index(x, y)], high[lattice.index(x_high, y_high)]);
+            let fraction = crossing_fraction(a, b, settings.isovalue * W::SCALE);
             let mut position = [x as f32, y as f32, planes.z as f32];
             position[AXIS] += fraction;
-            room(&mut out.positions, count)[i].write(position);
+            out.positions.spare_capacity_mut()[vertex].write(position);
             self.bounds.include(position);
             if settings.normals {
-                let [ga, gb] = &self.gradients;
-                let gradient = [0, 1, 2].map(|axis| mixed::<W>(ga[axis][i], gb[axis][i], fraction));
+                let ends = [
+                    End { slabs: [below, low, next_to_low], one_sided: planes.one_sided[0], x, y },
+                    End { slabs: [next_to_high, high, above], one_sided: planes.one_sided[1], x: x_high, y: y_high },
+                ];
+                let slopes = [0, 1].map(|end| lattice.gradient(&ends[end]).map(W::to_f32));
+                let gradient = [0, 1, 2].map(|axis| mixed(slopes[0][axis], slopes[1][axis], fraction));
                 let normal = unit(gradient).unwrap_or_else(|| {
-                    let ends = [
-                        lattice.steady_gradient([below, low, next_to_low], planes.one_sided[0], a, x, y),
-                        lattice.steady_gradient([next_to_high, high, above], planes.one_sided[1], b, xb, yb),
-                    ];
                     let mut fallback = [0.0; 3];
-                    fallback[AXIS] = if low[a].inside(W::threshold(settings.isovalue)) { 1.0 } else { -1.0 };
-                    steady_unit(ends, fraction, fallback)
+                    fallback[AXIS] = if a.inside(W::threshold(settings.isovalue)) { 1.0 } else { -1.0 };
+                    steady_unit(ends.map(|end| lattice.steady_gradient(&end)), fraction, fallback)
                 });
-                room(&mut out.normals, count)[i].write(normal);
+                out.normals.spare_capacity_mut()[vertex].write(normal);
             }
         }
     }
+}
+
+/// How much farther central differences reach than the one at `at`.
+#[inline(always)]
+const fn span(at: u32, last: u32) -> f32 {
+    if (at == 0) | (at == last) { 2.0 } else { 1.0 }
+}
+
+/// Four samples along x, from the one before the meshed sample at `x` with index `index`.
+///
+/// # Safety
+/// `x` and `index` are those of a meshed sample of a whole slab.
+#[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
+#[inline(always)]
+unsafe fn four<W: Weight, const PADDED: bool>(
+    lattice: &Lattice,
+    slab: &[W],
+    index: usize,
+    x: u32,
+) -> (W::Left, W::Right) {
+    // SAFETY: padding lies before and behind each row. Without it, the row's outermost samples stand in.
+    unsafe {
+        if PADDED {
+            debug_assert!(index >= 1 && index + 2 < slab.len());
+            return W::split(slab.as_ptr().add(index - 1).cast::<[W; 4]>().read());
+        }
+        let behind = lattice.size[0] - 1 - x as usize;
+        let [first, second] = [1, 2].map(|step| index + behind.min(step));
+        let before = index - usize::from(x > 0);
+        W::split([at(slab, before), at(slab, index), at(slab, first), at(slab, second)])
+    }
+}
+
+/// Two samples along x, from the one at `index` on.
+///
+/// # Safety
+/// `index` and the next are less than the slab's length.
+#[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
+#[inline(always)]
+unsafe fn two<W: Weight>(slab: &[W], index: usize) -> W::Pair {
+    debug_assert!(index + 1 < slab.len());
+    // SAFETY: as the caller promises.
+    W::pair(unsafe { slab.as_ptr().add(index).cast::<[W; 2]>().read() })
 }
 
 /// The first `count` words of a block, made up with zeros to a multiple of eight.
@@ -309,8 +418,7 @@ fn clamped(fraction: f32) -> f32 {
 }
 
 #[inline(always)]
-fn mixed<W: Weight>(a: W::Wide, b: W::Wide, fraction: f32) -> f32 {
-    let (a, b) = (W::to_f32(a), W::to_f32(b));
+fn mixed(a: f32, b: f32, fraction: f32) -> f32 {
     a + (b - a) * fraction
 }
 

@@ -61,15 +61,15 @@ impl Simd for Portable {
         counters: &mut [u32; 8],
         indices: &mut [MaybeUninit<u32>],
     ) -> usize {
-        let mut end = 0;
+        let (mut end, mut running) = (0, *counters);
         for &code in codes {
             let cell = &cells[usize::from(code) % CODES];
-            let mut vertices = [0; 16];
-            for lane in 0..8 {
-                vertices[lane] = counters[lane];
-                counters[lane] += u32::from(cell.steps[lane]);
-                vertices[8 + lane] = counters[lane];
+            let [a, b, c, d, e, f, g, h] = running;
+            for (counter, step) in running.iter_mut().zip(cell.steps) {
+                *counter += u32::from(step);
             }
+            let [.., high_e, high_f, high_g, high_h] = running;
+            let vertices = [a, b, c, d, e, f, g, h, 0, 0, 0, 0, high_e, high_f, high_g, high_h];
             if let Some(indices) = indices[end..].first_chunk_mut::<16>() {
                 for (index, vertex) in indices.iter_mut().zip(cell.vertices) {
                     index.write(vertices[usize::from(vertex) % 16]);
@@ -77,6 +77,7 @@ impl Simd for Portable {
             }
             end += usize::from(cell.count);
         }
+        *counters = running;
         end
     }
 }
