@@ -41,8 +41,18 @@ impl Signs {
             return;
         }
         self.resize(lattice);
-        for (y, words) in self.signs.chunks_exact_mut(lattice.words).enumerate() {
-            sign_row::<S, W>(&plane[lattice.origin + y * lattice.stride..], lattice.size[0], threshold, words);
+        let width = lattice.size[0];
+        if lattice.words == 1 {
+            for (y, word) in self.signs.iter_mut().enumerate() {
+                *word = sign_word::<S, W>(&plane[lattice.origin + y * lattice.stride..], width, threshold);
+            }
+        } else {
+            for (y, words) in self.signs.chunks_exact_mut(lattice.words).enumerate() {
+                let row = &plane[lattice.origin + y * lattice.stride..];
+                for (index, word) in words.iter_mut().enumerate() {
+                    *word = sign_word::<S, W>(&row[64 * index..], (width - 64 * index).min(64), threshold);
+                }
+            }
         }
         self.shift(lattice);
     }
@@ -113,35 +123,34 @@ fn uniform<S: Simd, W: Weight>(plane: &[W], threshold: W::Threshold) -> Option<b
     rest.iter().all(|weight| weight.inside(threshold) == inside).then_some(inside)
 }
 
-/// The signs of the first `len` samples of `row`; what is behind them is read, too, where it is there.
+/// The signs of the first `count` samples, 1 to 64; what is behind them is read, too, where it is there.
 #[inline(always)]
-fn sign_row<S: Simd, W: Weight>(row: &[W], len: usize, threshold: W::Threshold, words: &mut [u64]) {
-    for (index, word) in words.iter_mut().enumerate() {
-        let (weights, count) = (&row[64 * index..], len - 64 * index);
-        *word = if count >= 64 {
-            u64::from(half::<S, W>(weights, threshold)) | u64::from(half::<S, W>(&weights[32..], threshold)) << 32
-        } else if count == 33 {
-            // As many as a chunk of 32 cells has.
-            u64::from(half::<S, W>(weights, threshold)) | u64::from(weights[32].inside(threshold)) << 32
-        } else if count > 32 {
-            let high = u64::from(half::<S, W>(&weights[32..], threshold)) << 32;
-            (u64::from(half::<S, W>(weights, threshold)) | high) & ((1 << count) - 1)
-        } else {
-            u64::from(half::<S, W>(weights, threshold)) & ((1 << count) - 1)
-        };
+fn sign_word<S: Simd, W: Weight>(samples: &[W], count: usize, threshold: W::Threshold) -> u64 {
+    let mask = u64::MAX >> (64 - count);
+    if count == 33 {
+        // As many as a chunk of 32 cells has.
+        if let Some((low, rest)) = samples.split_first_chunk::<32>()
+            && let Some(last) = rest.first()
+        {
+            return u64::from(W::below::<S>(low, threshold)) | u64::from(last.inside(threshold)) << 32;
+        }
+    } else if count > 32 {
+        if let Some(samples) = samples.first_chunk::<64>() {
+            let mut signs = 0;
+            for (half, samples) in samples.as_chunks::<32>().0.iter().enumerate() {
+                signs |= u64::from(W::below::<S>(samples, threshold)) << (32 * half);
+            }
+            return signs & mask;
+        }
+    } else if let Some(samples) = samples.first_chunk::<32>() {
+        return u64::from(W::below::<S>(samples, threshold)) & mask;
     }
+    few(&samples[..count], threshold)
 }
 
-/// The signs of the first 32 weights; of all where there are fewer.
-#[inline(always)]
-fn half<S: Simd, W: Weight>(weights: &[W], threshold: W::Threshold) -> u32 {
-    match weights.first_chunk::<32>() {
-        Some(weights) => W::below::<S>(weights, threshold),
-        None => few(weights, threshold),
-    }
-}
-
+/// The same for the last samples of a slab.
 #[cold]
-fn few<W: Weight>(weights: &[W], threshold: W::Threshold) -> u32 {
-    weights.iter().enumerate().fold(0, |signs, (index, weight)| signs | u32::from(weight.inside(threshold)) << index)
+#[inline(never)]
+fn few<W: Weight>(samples: &[W], threshold: W::Threshold) -> u64 {
+    samples.iter().enumerate().fold(0, |signs, (index, sample)| signs | u64::from(sample.inside(threshold)) << index)
 }
