@@ -96,31 +96,38 @@ impl Signs {
     }
 }
 
-/// Whether all samples of a slab, padding included, have the same sign; most slabs of a terrain do, and cost no more
-/// than reading them once. A slab that does not is found out at the first sample of the other sign.
+/// Whether all samples of a slab, padding included, have the same sign. Most slabs of a terrain do, and cost no more
+/// than reading them once; in others, the first sample of the other sign is soon found.
 #[inline(always)]
 fn uniform<S: Simd, W: Weight>(plane: &[W], threshold: W::Threshold) -> Option<bool> {
-    let inside = plane[plane.len() - 1].inside(threshold);
+    (alike::<S, W>(plane, threshold) == plane.len()).then(|| plane[0].inside(threshold))
+}
+
+/// How many samples have the same sign as the first; of those just before the first other one, a few may be left out.
+#[inline(always)]
+pub(super) fn alike<S: Simd, W: Weight>(samples: &[W], threshold: W::Threshold) -> usize {
+    let inside = samples[0].inside(threshold);
     let expected = if inside { u32::MAX } else { 0 };
-    let (groups, rest) = plane.as_chunks::<128>();
-    for group in groups {
+    let (groups, rest) = samples.as_chunks::<128>();
+    for (index, group) in groups.iter().enumerate() {
         let mut others = 0;
         for weights in group.as_chunks::<32>().0 {
             others |= W::below::<S>(weights, threshold) ^ expected;
         }
         if others != 0 {
-            return None;
+            return 128 * index;
         }
     }
-    // The last of them once more where they are not whole groups of 32.
-    if let Some(last) = plane.last_chunk::<32>() {
-        let mut others = W::below::<S>(last, threshold) ^ expected;
-        for weights in rest.as_chunks::<32>().0 {
-            others |= W::below::<S>(weights, threshold) ^ expected;
-        }
-        return (others == 0).then_some(inside);
+    let mut others = 0;
+    for weights in rest.as_chunks::<32>().0 {
+        others |= W::below::<S>(weights, threshold) ^ expected;
     }
-    rest.iter().all(|weight| weight.inside(threshold) == inside).then_some(inside)
+    match samples.last_chunk::<32>() {
+        // Some of these once more.
+        Some(last) => others |= W::below::<S>(last, threshold) ^ expected,
+        None => others |= u32::from(rest.iter().any(|weight| weight.inside(threshold) != inside)),
+    }
+    samples.len() - if others == 0 { 0 } else { rest.len() }
 }
 
 /// The signs of the first `count` samples, 1 to 64; what is behind them is read, too, where it is there.

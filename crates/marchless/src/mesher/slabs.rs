@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::{
     MeshError, MeshSettings,
-    classify::Signs,
+    classify::{self, Signs},
     triangles::{self, FirstVertices},
     vertices::{Planes, Vertices},
 };
@@ -285,9 +285,17 @@ impl<W: Weight> Job for Part<'_, W> {
     fn run<S: Simd>(self) -> Self::Output {
         let Self { samples, lattice, cells, settings, slabs, out } = self;
         let is_last_part = cells.end + 1 == lattice.size[2];
+        // Slabs alike from the first on have no surface: the last of them will do.
+        let padding = usize::from(lattice.padded);
+        let given = &samples.weights()[(cells.start + padding) * lattice.len..(cells.end + 1 + padding) * lattice.len];
+        let alike = classify::alike::<S, W>(given, W::threshold(settings.isovalue)) / lattice.len;
+        let start = cells.start + alike.saturating_sub(1);
+        if start == cells.end {
+            return Ok(());
+        }
         let mut pass = Vertices::new();
-        for z in cells.start..cells.end + 1 {
-            let place = if z == cells.start {
+        for z in start..cells.end + 1 {
+            let place = if z == start {
                 Place::First
             } else if z == cells.end && !is_last_part {
                 Place::Last
