@@ -1,7 +1,7 @@
 //! Brushes: a [`Stamp`] is one application of a shape and an operation to samples, in integers throughout.
 //!
-//! A stamp is quantised once, when its shape and stroke are made from floating-point numbers; from then on the same stamps
-//! in the same order give the same samples, bit for bit, on any machine. Each sample changes by itself, so
+//! A stamp is quantised once, when its shape and stroke are made from floating-point numbers; from then on the same
+//! stamps in the same order give the same samples, bit for bit, on any machine. Each sample changes by itself, so
 //! stamps may be applied to a whole [`Grid`](crate::Grid) or chunk by chunk, each chunk in its own time.
 //!
 //! ```

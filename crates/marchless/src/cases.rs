@@ -11,9 +11,9 @@
 //! Refused: any triangulation that avoids face diagonals. Of the 16 that a loop of seven crossings has, 4 have
 //! triangles that cross; the 3 that are fans do not.
 //!
-//! The face rule is that of the regular cells in Eric Lengyel, "Voxel-Based Terrain for Real-Time Virtual
-//! Simulations" (2010); the cases themselves go back to William E. Lorensen and Harvey E. Cline, "Marching Cubes: A High Resolution 3D
-//! Surface Construction Algorithm" (1987).
+//! The face rule is that of the regular cells in Eric Lengyel, "Voxel-Based Terrain for Real-Time Virtual Simulations"
+//! (2010); the cases themselves go back to William E. Lorensen and Harvey E. Cline, "Marching Cubes: A High Resolution
+//! 3D Surface Construction Algorithm" (1987).
 
 use crate::cell::{CaseIndex, Corner, Edge, Face};
 

@@ -32,8 +32,9 @@ pub const MAX_CHUNK_CELLS: u32 = 62;
 /// Cloning shares the samples, and either copy may be edited without affecting the other. The grid remembers which
 /// chunks' meshes an edit has changed, until [`Grid::take_dirty`].
 ///
-/// A **bounded** grid has air around it, so that its chunks' meshes together are closed: every sample written is intersected
-/// with a box half a voxel inside the outermost planes, and meshes of higher isovalues with that box once more.
+/// A **bounded** grid has air around it, so that its chunks' meshes together are closed: every sample written is
+/// intersected with a box half a voxel inside the outermost planes, and meshes of higher isovalues with that box once
+/// more.
 ///
 /// ```
 /// use marchless::{Grid, Region, Voxel};
@@ -150,8 +151,8 @@ impl<W: Weight> Grid<W> {
         Ok(())
     }
 
-    /// Samples `source` for the chunk at `position` ([`Chunk::from_source`]) and puts it there. `spacing`: world units per
-    /// voxel.
+    /// Samples `source` for the chunk at `position` ([`Chunk::from_source`]) and puts it there. `spacing`: world units
+    /// per voxel.
     ///
     /// ```
     /// use marchless::{Grid, Region};

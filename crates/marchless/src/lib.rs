@@ -16,8 +16,9 @@
 //! | stamp, edit | one application of a brush; what it has changed |
 //!
 //! # From samples to a mesh
-//! [`Mesher`] meshes any borrowed [`Samples`] into a reusable [`MeshBuffer`]. [`Grid`] keeps a whole volume in chunks that
-//! mesh one by one without seams:
+//! [`Mesher`] meshes any borrowed [`Samples`] into a reusable [`MeshBuffer`]; [`SlabMesher`] meshes volumes that come
+//! slab by slab and need not fit in memory, and `ThreadedMesher` (feature `std`) large ones on several threads, all
+//! three the same mesh. [`Grid`] keeps a whole volume in chunks that mesh one by one without seams:
 //!
 //! ```
 //! use marchless::{BrushShape, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Operation, Region, Stamp};
@@ -39,7 +40,8 @@
 //! # Guaranteed
 //! - Within a chunk and across chunks the surface is closed, 2-manifold, consistently oriented and free of zero-area
 //!   triangles, on every input, ties with the isovalue included; vertices on a shared border are equal bit for bit.
-//! - The same samples give the same mesh, and the same stamps in the same order the same samples, bit for bit, on any machine.
+//! - The same samples give the same mesh, and the same stamps in the same order the same samples, bit for bit, on any
+//!   machine.
 //! - No samples, stamps, rays or meshes panic: NaN and infinite samples have a meaning ([`Weight`]), and what cannot be
 //!   meshed is a typed error. (Constructors of a cell's parts say when they do.)
 //! - [`Mesher::mesh`] and [`Neighbourhood::mesh`] allocate nothing once their buffers are warm.
@@ -50,7 +52,9 @@
 //! - Clean meshes of more than 4,096 cells per axis at once: `f32` positions have no room for the clamp there.
 //!
 //! # Features
-//! `std` (default) uses the standard library's square root instead of `libm`'s; the results are the same.
+//! `std` (default) finds out at run time which instructions the processor has ([`Backend`]), instead of using those
+//! that the crate was compiled for; it adds `ThreadedMesher`, and uses the standard library's square root instead of
+//! `libm`'s. No feature changes a result.
 #![no_std]
 #![deny(unsafe_code)]
 

@@ -5,16 +5,17 @@
 //!                                             └─3 triangles─▶ one visit per active cell between two slabs
 //! ```
 //!
-//! The signs of a row of samples along x are packed into 64-bit words. Which edges the surface crosses are then `xor`s of neighbouring
-//! words, and only the few crossings and active cells are ever looked at one by one. All passes work on one slab of
-//! samples after the other, while it is in the cache; nothing but the signs of two slabs is kept between them.
+//! The signs of a row of samples along x are packed into 64-bit words. Which edges the surface crosses are then `xor`s
+//! of neighbouring words, and only the few crossings and active cells are ever looked at one by one. All passes work on
+//! one slab of samples after the other, while it is in the cache; nothing but the signs of two slabs is kept between
+//! them.
 //!
 //! Vertices are numbered slab by slab: those on edges along z from the slab below, then those on edges along x and
 //! along y, each row by row. Triangles follow the cells, x fastest.
 //!
 //! The way vertices are found without a map is that of William Schroeder, Rob Maynard and Berk Geveci, "Flying Edges: A
-//! High-Performance Scalable Isocontouring Algorithm" (2015), with words of sign bits in the place of edge cases, and counters
-//! that run through a whole slab in the place of offsets per row.
+//! High-Performance Scalable Isocontouring Algorithm" (2015), with words of sign bits in the place of edge cases, and
+//! counters that run through a whole slab in the place of offsets per row.
 
 mod classify;
 mod output;
@@ -31,9 +32,10 @@ use crate::{
     buffer::MeshBuffer,
     lattice::{Samples, Shape},
     sample::Weight,
-    simd::{Backend, dispatch},
+    simd::Backend,
 };
-use slabs::{Lattice, Part, Slabs};
+use slabs::{Lattice, Slabs};
+pub(crate) use slabs::{NextSlab, Part};
 pub use stream::SlabMesher;
 #[cfg(feature = "std")]
 pub use threads::ThreadedMesher;
@@ -66,9 +68,9 @@ impl Default for MeshSettings {
 /// Turns samples into meshes; keeps its scratch memory between them.
 ///
 /// The surface is closed, 2-manifold, consistently oriented and free of zero-area triangles on every input, except
-/// where it leaves the meshed box, and up to 4,096 cells per axis (`f32` positions have no room for the clamp
-/// beyond). Crossings keep 1/1024 of their edge away from its ends. NaN samples count as outside, infinite ones by
-/// their sign; all positions and normals are finite whatever the samples are. The same samples give the same mesh, bit for bit.
+/// where it leaves the meshed box, and up to 4,096 cells per axis (`f32` positions have no room for the clamp beyond).
+/// Crossings keep 1/1024 of their edge away from its ends. NaN samples count as outside, infinite ones by their sign;
+/// all positions and normals are finite whatever the samples are. The same samples give the same mesh, bit for bit.
 ///
 /// Not guaranteed: the topology of the trilinear interpolant in ambiguous cells; triangles of a good shape.
 ///
@@ -125,7 +127,7 @@ impl Mesher {
         let lattice = Lattice::of(&samples)?;
         let backend = *self.backend.get_or_insert_with(Backend::fastest);
         let cells = 0..lattice.size[2] - 1;
-        let meshed = dispatch(backend, Part { samples, lattice, cells, settings, slabs: &mut self.slabs, out });
+        let meshed = W::mesh_part(backend, Part { samples, lattice, cells, settings, slabs: &mut self.slabs, out });
         if meshed.is_err() {
             out.clear();
         }
@@ -139,7 +141,7 @@ impl Default for Mesher {
     }
 }
 
-/// Why nothing was meshed.
+/// Why meshing stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeshError {

@@ -1,8 +1,8 @@
 //! Questions to a [`Grid`]: what a ray hits, and the weight anywhere.
 //!
-//! A ray walks from chunk to chunk, past those that are uniform, and from cell to cell in the others (John Amanatides and
-//! Andrew Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", 1987). In a cell that the surface crosses it
-//! is tested against the very triangles that the mesher makes of it.
+//! A ray walks from chunk to chunk, past those that are uniform, and from cell to cell in the others (John Amanatides
+//! and Andrew Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", 1987). In a cell that the surface crosses it is
+//! tested against the very triangles that the mesher makes of it.
 
 mod ray;
 #[cfg(test)]
@@ -26,7 +26,8 @@ pub struct RayHit {
     pub distance: f64,
     /// Where.
     pub position: [f64; 3],
-    /// The normal of the triangle that was hit, of unit length, to the outside; which side was hit, the ray's direction tells.
+    /// The normal of the triangle that was hit, of unit length, to the outside; which side was hit, the ray's direction
+    /// tells.
     pub normal: [f32; 3],
     /// The material of the triangle's corner nearest to the hit.
     pub material: u8,
@@ -36,11 +37,12 @@ pub struct RayHit {
     pub chunk: [i32; 3],
 }
 
-/// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no ray.
+/// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no
+/// ray.
 ///
-/// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue (in voxels). `origin`, `direction` and `max_distance` are in
-/// lattice units; the direction may have any length but 0, and the distance may be infinite. A ray along
-/// a triangle's plane or through its very edge may count as a hit or as a miss.
+/// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue (in voxels). `origin`, `direction` and
+/// `max_distance` are in lattice units; the direction may have any length but 0, and the distance may be infinite. A
+/// ray along a triangle's plane or through its very edge may count as a hit or as a miss.
 ///
 /// ```
 /// use marchless::{BrushShape, Grid, Operation, Stamp, ray_cast};
@@ -87,11 +89,11 @@ pub fn ray_cast<W: Weight>(
 /// Where there are more chunk positions than this for every chunk, it is not worth walking through all of them.
 const SPARSE: u128 = 27;
 
-/// The weight at any position, in voxels: trilinear between the eight lattice points around it; finite, infinite and NaN samples
-/// count as the farthest finite ones of their side. `None` where the position is not finite.
+/// The weight at any position, in voxels: trilinear between the eight lattice points around it; finite, infinite and
+/// NaN samples count as the farthest finite ones of their side. `None` where the position is not finite.
 ///
-/// `position`: in lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles,
-/// which the trilinear surface only comes close to.
+/// `position`: in lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of
+/// triangles, which the trilinear surface only comes close to.
 pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
     if !position.iter().all(|v| v.is_finite()) {
         return None;

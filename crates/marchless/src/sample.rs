@@ -2,7 +2,10 @@
 
 use core::fmt::Debug;
 
-use crate::simd::Simd;
+use crate::{
+    mesher::{MeshError, NextSlab, Part},
+    simd::{Backend, Simd, dispatch},
+};
 
 /// The sample at one lattice point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -50,7 +53,10 @@ pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private:
 
 /// What the passes need of a weight, out of the users' reach.
 pub(crate) mod private {
-    use crate::simd::Simd;
+    use crate::{
+        mesher::{MeshError, NextSlab, Part},
+        simd::{Backend, Simd},
+    };
 
     pub trait Sealed: Sized + Copy {
         /// The isovalue in this weight's own terms, so that [`Sealed::inside`] is one comparison.
@@ -81,12 +87,28 @@ pub(crate) mod private {
         /// How far along the edge from `a` to `b` the isovalue lies, before clamping, and whether it is so: where it is
         /// not, [`Sealed::fraction`] knows. Has no branch. `isovalue`: in steps (voxels × `SCALE`).
         fn quick_fraction(a: Self::Wide, b: Self::Wide, isovalue: f32) -> (f32, bool);
-        /// How far along the edge from `a` to `b` the isovalue lies, before clamping; `a` and `b` lie on its two
-        /// sides. Finite, but for a NaN where both ends are the same limit of `f32`. `isovalue`: in steps (voxels × `SCALE`).
+        /// How far along the edge from `a` to `b` the isovalue lies, before clamping; `a` and `b` lie on its two sides.
+        /// Finite, but for a NaN where both ends are the same limit of `f32`. `isovalue`: in steps (voxels × `SCALE`).
         fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
         /// The sample as a finite number, for the rare gradients that overflow.
         fn finite(self) -> f64;
+        /// Meshes a part of a volume, or the next of many slabs. Here, and not generic, so that the passes are compiled in
+        /// this crate, once, with its level of optimisation.
+        fn mesh_part(backend: Backend, part: Part<'_, Self>) -> Result<(), MeshError>;
+        fn mesh_slab(backend: Backend, slab: NextSlab<'_, Self>) -> Result<(), MeshError>;
     }
+}
+
+macro_rules! compiled_here {
+    () => {
+        fn mesh_part(backend: Backend, part: Part<'_, Self>) -> Result<(), MeshError> {
+            dispatch(backend, part)
+        }
+
+        fn mesh_slab(backend: Backend, slab: NextSlab<'_, Self>) -> Result<(), MeshError> {
+            dispatch(backend, slab)
+        }
+    };
 }
 
 macro_rules! integer_weight {
@@ -201,6 +223,8 @@ macro_rules! integer_weight {
             fn finite(self) -> f64 {
                 f64::from(self)
             }
+
+            compiled_here!();
         }
     };
 }
@@ -291,7 +315,7 @@ impl private::Sealed for f32 {
         let difference = b - a;
         let size = difference.abs();
         // Outside this range the difference overflowed, lost its bits, or an end is not finite.
-        ((isovalue - a) / difference, (size >= 1e-30) & (size < 1e30))
+        ((isovalue - a) / difference, is_sound(size))
     }
 
     #[inline(always)]
@@ -308,6 +332,14 @@ impl private::Sealed for f32 {
     fn finite(self) -> f64 {
         if self.is_nan() { f64::from(Self::MAX) } else { f64::from(self.clamp(Self::MIN, Self::MAX)) }
     }
+
+    compiled_here!();
+}
+
+/// Whether `f32` computes well with a number of this size. Has no branch.
+#[inline(always)]
+pub(crate) const fn is_sound(size: f32) -> bool {
+    (size >= 1e-30) & (size < 1e30)
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! However a mesh is made, it is the same mesh, byte for byte: on every backend, slab by slab, and on any number of threads.
+//! However a mesh is made, it is the same mesh, byte for byte: on every backend, slab by slab, and on any number of
+//! threads.
 
 #[path = "support/fields.rs"]
 mod fields;
@@ -66,13 +67,16 @@ fn streamed<W: TestWeight>(samples: Samples<'_, W>, settings: &MeshSettings, tak
 fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> Result<(), TestCaseError> {
     let settings = MeshSettings { isovalue: field.isovalue, normals };
     let portable = meshed(Mesher::with_backend(Backend::Portable), field.samples(), &settings);
-    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+    for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
         let mesh = meshed(Mesher::with_backend(backend), field.samples(), &settings);
         prop_assert_eq!(&mesh, &portable, "{}", backend.name());
     }
     for threads in 1..=3 {
         let mut mesh = MeshBuffer::new();
         let mut mesher = ThreadedMesher::new(NonZero::new(threads).expect("there is a thread"));
+        // A mesher and a buffer that have seen other samples must not remember them.
+        let turned_over = MeshSettings { isovalue: -field.isovalue, normals: true };
+        mesher.mesh(Samples::new(field.shape, &field.weights)?, &turned_over, &mut mesh)?;
         mesher.mesh(field.samples(), &settings, &mut mesh)?;
         prop_assert_eq!(&bits(&mesh), &portable, "{} threads", threads);
     }
@@ -100,7 +104,8 @@ proptest! {
     }
 }
 
-/// Every way in which 8 samples, three times behind one another, can lie: all cases of a cell beside all of its neighbour.
+/// Every way in which 8 samples, three times behind one another, can lie: all cases of a cell beside all of its
+/// neighbour.
 #[test]
 fn all_pairs_of_cases_are_the_same() {
     let shape = Shape::new([3, 2, 2]).expect("the size is small");
@@ -110,7 +115,7 @@ fn all_pairs_of_cases_are_the_same() {
             (0..12).map(|index| if signs >> index & 1 == 1 { -1.0 } else { 0.5 + index as f32 }).collect();
         let samples = Samples::new(shape, &weights).expect("one weight a sample");
         let portable = meshed(Mesher::with_backend(Backend::Portable), samples, &settings);
-        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
             assert_eq!(meshed(Mesher::with_backend(backend), samples, &settings), portable, "{}", backend.name());
         }
     }
@@ -121,10 +126,55 @@ fn machines_without_a_backend_do_without() {
     let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
     let samples = Samples::new(Shape::cube(2).expect("the size is small"), &weights).expect("one weight a sample");
     let plain = meshed(Mesher::with_backend(Backend::Portable), samples, &MeshSettings::default());
-    for backend in Backend::ALL {
+    for &backend in Backend::ALL {
         assert_eq!(meshed(Mesher::with_backend(backend), samples, &MeshSettings::default()), plain);
     }
-    assert!(Backend::Portable.is_available() && Backend::fastest().is_available());
+}
+
+#[test]
+fn the_fastest_backend_is_the_last_that_is_available() {
+    let available: Vec<_> = Backend::ALL.iter().copied().filter(|backend| backend.is_available()).collect();
+    assert_eq!(available.first(), Some(&Backend::Portable));
+    assert_eq!(available.last(), Some(&Backend::fastest()));
+    assert_eq!(
+        Backend::ALL.iter().map(|backend| backend.name()).collect::<Vec<_>>(),
+        ["portable", "sse2", "avx2", "avx512"]
+    );
+    #[cfg(target_arch = "x86_64")]
+    assert_eq!(Backend::Avx2.is_available(), ["avx2", "bmi2", "lzcnt"].iter().all(|&name| processor_has(name)));
+}
+
+#[cfg(target_arch = "x86_64")]
+fn processor_has(name: &str) -> bool {
+    match name {
+        "avx2" => is_x86_feature_detected!("avx2"),
+        "bmi2" => is_x86_feature_detected!("bmi2"),
+        _ => is_x86_feature_detected!("lzcnt"),
+    }
+}
+
+#[test]
+fn threads_refuse_what_one_refuses() {
+    let mut mesher = ThreadedMesher::new(NonZero::new(2).expect("two are some"));
+    let mut mesh = MeshBuffer { positions: vec![[0.0; 3]], ..MeshBuffer::new() };
+    let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
+    let samples = Samples::new(Shape::cube(2).expect("the size is small"), &weights).expect("one weight a sample");
+    let refused = mesher.mesh(samples, &MeshSettings { isovalue: f32::NAN, normals: true }, &mut mesh);
+    assert!(matches!(refused, Err(MeshError::Isovalue { found }) if found.is_nan()) && mesh.positions.is_empty());
+    let refused = mesher.mesh(samples.padded(), &MeshSettings::default(), &mut mesh);
+    assert_eq!(refused, Err(MeshError::TooSmall { shape: samples.shape(), least: 4 }));
+    assert_eq!(mesh, MeshBuffer::new());
+}
+
+/// As where a game has moved what came out before.
+#[test]
+fn slabs_widen_bounds_that_are_there() {
+    let mut mesh = MeshBuffer { bounds: Some([[-3.0, -2.0, 0.5], [-1.0, 9.0, 1.5]]), ..MeshBuffer::new() };
+    let mut mesher = SlabMesher::<f32>::new([3, 2], MeshSettings::default()).expect("the slabs have cells");
+    mesher.push(&[1.0; 6], &mut mesh).expect("the slab is whole");
+    mesher.push(&[-1.0; 6], &mut mesh).expect("the slab is whole");
+    mesher.finish(&mut mesh).expect("there are two slabs");
+    assert_eq!(mesh.bounds, Some([[-3.0, -2.0, 0.5], [2.0, 9.0, 1.5]]));
 }
 
 #[test]

@@ -24,8 +24,8 @@ impl Grid<i16> {
         edit
     }
 
-    /// Applies `stamp` to the samples of one chunk only, and marks dirty what has changed. Nothing changes where there is
-    /// no place for a chunk.
+    /// Applies `stamp` to the samples of one chunk only, and marks dirty what has changed. Nothing changes where there
+    /// is no place for a chunk.
     ///
     /// Applied to every chunk, each in its own time but with the stamps in the same order, it gives the same samples as
     /// [`Grid::apply`].
@@ -54,9 +54,9 @@ impl Chunk<i16> {
     /// Applies `stamp` to the samples of the chunk. A uniform chunk stays uniform where all of it changes alike, and
     /// samples are written out or copied only where some of them change.
     ///
-    /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes of
-    /// a bounded grid ([`Grid::planes`]): its border stays closed, and nothing changes beyond. Nothing changes either in
-    /// a chunk whose samples are not `cells³`, or where no chunk has so many.
+    /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes
+    /// of a bounded grid ([`Grid::planes`]): its border stays closed, and nothing changes beyond. Nothing changes
+    /// either in a chunk whose samples are not `cells³`, or where no chunk has so many.
     pub fn apply_stamp(&mut self, origin: [i32; 3], cells: u32, planes: Option<Region>, stamp: &Stamp) -> Edit {
         let chunk = Region::new(origin, origin.map(|v| v.saturating_add_unsigned(cells)));
         let area = planes.map_or(chunk, |planes| chunk.intersection(&planes)).intersection(&stamp.region());

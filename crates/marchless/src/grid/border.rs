@@ -25,8 +25,8 @@ impl Border {
         Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from), isovalue: 0.0 }
     }
 
-    /// The border that surfaces at `isovalue` need on top, so that beyond it all is outside for them too. `None` where the
-    /// samples as they are written suffice.
+    /// The border that surfaces at `isovalue` need on top, so that beyond it all is outside for them too. `None` where
+    /// the samples as they are written suffice.
     pub(crate) fn raised(self, isovalue: f32) -> Option<Self> {
         (isovalue > 0.0).then_some(Self { isovalue, ..self })
     }

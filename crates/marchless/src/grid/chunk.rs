@@ -37,9 +37,10 @@ impl<W: Weight> Chunk<W> {
 
     /// Samples `source` for the chunk at chunk position `position`; runs on any thread.
     ///
-    /// The source is asked for a bound first, of the chunk and four points around it: then the distances that are
-    /// left out are too far from the surface to matter to it, for isovalues within ±3 voxels. `cells`: 8 to 62, clamped. `spacing`: world units per
-    /// voxel. A position whose lattice points do not fit in `i32` gives the chunk nearest to it; no grid takes it.
+    /// The source is asked for a bound first, of the chunk and four points around it: then the distances that are left
+    /// out are too far from the surface to matter to it, for isovalues within ±3 voxels. `cells`: 8 to 62, clamped.
+    /// `spacing`: world units per voxel. A position whose lattice points do not fit in `i32` gives the chunk nearest to
+    /// it; no grid takes it.
     pub fn from_source(source: &(impl Source + ?Sized), position: [i32; 3], cells: u32, spacing: f64) -> Self {
         let cells = cells.clamp(MIN_CHUNK_CELLS, MAX_CHUNK_CELLS);
         let min = position.map(|v| v.saturating_mul(cells as i32));

@@ -24,8 +24,8 @@ pub(super) unsafe fn keep<T>(items: &mut Vec<T>, count: usize) {
     unsafe { items.set_len(items.len() + count) }
 }
 
-/// Bounds of positions that are not negative, as bits: those are in the same order, and vector instructions compare integers without
-/// a thought for NaN.
+/// Bounds of positions that are not negative, as bits: those are in the same order, and vector instructions compare
+/// integers without a thought for NaN.
 #[derive(Clone, Copy)]
 pub(super) struct Bounds {
     pub(super) min: [u32; 3],
@@ -38,20 +38,26 @@ impl Bounds {
 
     /// Takes in one position.
     pub(super) fn include(&mut self, position: [f32; 3]) {
-        for axis in 0..3 {
-            self.min[axis] = self.min[axis].min(position[axis].to_bits());
-            self.max[axis] = self.max[axis].max(position[axis].to_bits());
+        for (axis, bits) in position.map(f32::to_bits).into_iter().enumerate() {
+            self.min[axis] = self.min[axis].min(bits);
+            self.max[axis] = self.max[axis].max(bits);
         }
     }
 
     /// Widens the bounds of `buffer` by these.
-    pub(super) fn widen(mut self, buffer: &mut MeshBuffer) {
-        if self.min[0] > self.max[0] {
-            return;
+    pub(super) fn widen(self, buffer: &mut MeshBuffer) {
+        if self.min[0] <= self.max[0] {
+            let bounds = [self.min, self.max].map(|corner| corner.map(f32::from_bits));
+            buffer.bounds = union(buffer.bounds, Some(bounds));
         }
-        for corner in buffer.bounds.into_iter().flatten() {
-            self.include(corner);
-        }
-        buffer.bounds = Some([self.min, self.max].map(|corner| corner.map(f32::from_bits)));
     }
+}
+
+/// The smallest box around two boxes, where there are any.
+pub(super) fn union(a: Option<[[f32; 3]; 2]>, b: Option<[[f32; 3]; 2]>) -> Option<[[f32; 3]; 2]> {
+    let (Some([a_min, a_max]), Some([b_min, b_max])) = (a, b) else { return a.or(b) };
+    Some([
+        core::array::from_fn(|axis| a_min[axis].min(b_min[axis])),
+        core::array::from_fn(|axis| a_max[axis].max(b_max[axis])),
+    ])
 }

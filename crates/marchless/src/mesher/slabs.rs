@@ -47,8 +47,8 @@ impl Lattice {
         Ok(Self::new([size[0], size[1], depth], padding as usize, stride, len))
     }
 
-    /// The lattice of slabs of `size` samples without padding, of which nobody knows how many there are; `None` where they have no cells or do
-    /// not fit in memory.
+    /// The lattice of slabs of `size` samples without padding, of which nobody knows how many there are; `None` where
+    /// they have no cells or do not fit in memory.
     pub(super) fn of_slabs(size: [u32; 2]) -> Option<Self> {
         let shape = Shape::new([size[0], size[1], 1]).ok()?;
         let [_, stride, len] = shape.strides();
@@ -90,72 +90,12 @@ impl Lattice {
         if self.words == 1 {
             return (word as u32, 0);
         }
-        let (word, words) = (word as u32, self.words as u32);
-        (word / words, 64 * (word % words))
-    }
-
-    /// Twice the gradient at an end of an edge.
-    pub(super) fn gradient<W: Weight>(&self, end: &End<'_, W>) -> [W::Wide; 3] {
-        self.differences(end, |high, low| W::difference(high, low), W::doubled)
-    }
-
-    /// The same, where differences may overflow.
-    pub(super) fn steady_gradient<W: Weight>(&self, end: &End<'_, W>) -> [f64; 3] {
-        self.differences(end, |high, low| high.finite() - low.finite(), |difference| difference * 2.0)
-    }
-
-    fn differences<W: Copy, D: Copy>(
-        &self,
-        end: &End<'_, W>,
-        difference: impl Fn(W, W) -> D,
-        doubled: impl Fn(D) -> D,
-    ) -> [D; 3] {
-        let [below, slab, above] = end.slabs;
-        let at = self.index(end.x, end.y);
-        let ([low, high], one_sided) = self.neighbours(at, end.x, end.y);
-        let differences = [
-            difference(slab[high[0]], slab[low[0]]),
-            difference(slab[high[1]], slab[low[1]]),
-            difference(above[at], below[at]),
-        ];
-        let one_sided = [one_sided[0], one_sided[1], end.one_sided];
-        core::array::from_fn(|k| if one_sided[k] { doubled(differences[k]) } else { differences[k] })
-    }
-
-    /// The indices of a sample's lower and higher neighbours along x and y, and whether it is one of them itself.
-    fn neighbours(&self, at: usize, x: u32, y: u32) -> ([[usize; 2]; 2], [bool; 2]) {
-        let first = [!self.padded && x == 0, !self.padded && y == 0];
-        let last = [!self.padded && x as usize + 1 == self.size[0], !self.padded && y as usize + 1 == self.size[1]];
-        let low = [at - usize::from(!first[0]), at - if first[1] { 0 } else { self.stride }];
-        let high = [at + usize::from(!last[0]), at + if last[1] { 0 } else { self.stride }];
-        ([low, high], [first[0] | last[0], first[1] | last[1]])
+        ((word / self.words) as u32, 64 * (word % self.words) as u32)
     }
 }
 
-/// An end of an edge, and where to find what its gradient is made of.
-pub(super) struct End<'a, W> {
-    /// The slab below, its own, and the one above.
-    pub(super) slabs: [&'a [W]; 3],
-    /// Whether the gradient along z is one-sided.
-    pub(super) one_sided: bool,
-    pub(super) x: u32,
-    pub(super) y: u32,
-}
-
-/// The sample of a slab at `index`.
-///
-/// # Safety
-/// `index` is less than the slab's length.
-#[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
-#[inline(always)]
-pub(super) unsafe fn at<W: Copy>(slab: &[W], index: usize) -> W {
-    debug_assert!(index < slab.len());
-    // SAFETY: as the caller promises.
-    unsafe { *slab.get_unchecked(index) }
-}
-
-/// A slab of samples with those around it: whole slabs, padding included. Beyond an open border the outermost slab stands in
-/// for those that are missing.
+/// A slab of samples with those around it: whole slabs, padding included. Beyond an open border the outermost slab
+/// stands in for those that are missing.
 #[derive(Clone, Copy)]
 pub(super) struct Window<'a, W> {
     /// The slabs two below, one below, the slab itself, and the one above.
@@ -171,13 +111,13 @@ pub(super) struct Window<'a, W> {
 /// What is remembered from slab to slab.
 #[derive(Clone, Debug)]
 pub(super) struct Slabs {
-    /// The signs of the slab before, of the slab itself, and of the next one: that is read early, in one go, so that the gradients, which
-    /// need a sample of it here and there, find it in the cache.
+    /// The signs of the slab before, of the slab itself, and of the next one: that is read early, in one go, so that
+    /// the gradients, which need a sample of it here and there, find it in the cache.
     signs: [Signs; 3],
     /// The first vertices of the slab before on edges along x and y.
     first: [u64; 2],
     /// All vertices so far.
-    vertices: u64,
+    pub(super) vertices: u64,
 }
 
 impl Slabs {
@@ -186,8 +126,9 @@ impl Slabs {
     }
 
     /// Takes in the next slab: makes the vertices on edges from the slab before and on those within the slab, and the
-    /// triangles in between. Of the first slab (of a volume or a part of it) there is no slab before; of the last one of a part, the
-    /// vertices within belong to the next part and are not made. `next`: the slab that will come next, if any.
+    /// triangles in between. Of the first slab (of a volume or a part of it) there is no slab before; of the last one
+    /// of a part, the vertices within belong to the next part and are not made. `next`: the slab that will come next,
+    /// if any.
     #[inline(always)]
     pub(super) fn step<S: Simd, W: Weight>(
         &mut self,
@@ -235,7 +176,7 @@ impl Slabs {
                 z: window.z,
             };
             let (signs, neighbours) = (newest.signs(), newest.next());
-            if place == Place::Last {
+            if place == Place::Beyond {
                 self.first[1] += triangles::crossings(signs, neighbours);
             } else {
                 self.vertices += pass.place::<S, 0>(lattice, &planes, settings, signs, neighbours, out);
@@ -263,12 +204,12 @@ pub(super) enum Place {
     First,
     /// After another one.
     Next,
-    /// First of the next part of the volume.
-    Last,
+    /// Behind the last of a part: the next part's first.
+    Beyond,
 }
 
 /// The cells between some slabs of a volume.
-pub(super) struct Part<'a, W> {
+pub struct Part<'a, W> {
     pub(super) samples: Samples<'a, W>,
     pub(super) lattice: Lattice,
     /// Cells along z; not empty.
@@ -298,7 +239,7 @@ impl<W: Weight> Job for Part<'_, W> {
             let place = if z == start {
                 Place::First
             } else if z == cells.end && !is_last_part {
-                Place::Last
+                Place::Beyond
             } else {
                 Place::Next
             };
@@ -312,7 +253,7 @@ impl<W: Weight> Job for Part<'_, W> {
 }
 
 /// One slab of many that come one by one.
-pub(super) struct NextSlab<'a, W> {
+pub struct NextSlab<'a, W> {
     pub(super) lattice: &'a Lattice,
     pub(super) window: Window<'a, W>,
     /// Whether another one will come.

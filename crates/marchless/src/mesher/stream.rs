@@ -6,16 +6,12 @@ use super::{
     MeshError, MeshSettings,
     slabs::{Lattice, NextSlab, Slabs, Window},
 };
-use crate::{
-    buffer::MeshBuffer,
-    sample::Weight,
-    simd::{Backend, dispatch},
-};
+use crate::{buffer::MeshBuffer, sample::Weight, simd::Backend};
 
 /// Meshes a volume that is fed slab by slab, along z; holds four slabs of it.
 ///
-/// All together that it makes is what [`Mesher::mesh`](super::Mesher::mesh) makes of the whole volume at once, byte for byte; the same
-/// promises hold.
+/// Joined, all that it makes is what [`Mesher::mesh`](super::Mesher::mesh) makes of the whole volume at once, byte for
+/// byte; the same promises hold. Slabs have no materials.
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshSettings, SlabMesher};
@@ -54,7 +50,8 @@ impl<W: Weight> SlabMesher<W> {
     /// volume's border the gradient is one-sided.
     ///
     /// # Errors
-    /// [`MeshError::SlabSize`], [`MeshError::Isovalue`].
+    /// [`MeshError::SlabSize`] where an axis has fewer than 2 samples or a slab does not fit in memory;
+    /// [`MeshError::Isovalue`] where the isovalue is not finite.
     pub fn new(size: [u32; 2], settings: MeshSettings) -> Result<Self, MeshError> {
         settings.check()?;
         let lattice = Lattice::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
@@ -64,10 +61,12 @@ impl<W: Weight> SlabMesher<W> {
 
     /// Takes in the next slab and appends to `out` what it completes. `slab`: `[nx·ny]`, x fastest.
     ///
-    /// Vertices, indices and bounds may be taken out of `out` between calls: indices go on counting all vertices since the first slab.
+    /// Vertices, indices and bounds may be taken out of `out` between calls: indices go on counting all vertices since
+    /// the first slab.
     ///
     /// # Errors
-    /// [`MeshError::SlabLength`], and nothing has changed; [`MeshError::TooManyVertices`], and so with every further call.
+    /// [`MeshError::SlabLength`], and nothing has changed. [`MeshError::TooManyVertices`], and so with every further
+    /// call; `out` then ends with vertices of no triangle.
     pub fn push(&mut self, slab: &[W], out: &mut MeshBuffer) -> Result<(), MeshError> {
         if slab.len() != self.lattice.len {
             let (size, expected) = (self.size, self.lattice.len);
@@ -102,6 +101,38 @@ impl<W: Weight> SlabMesher<W> {
             one_sided: [z <= 1, z == 0 || z == last],
         };
         let (lattice, settings, slabs) = (&self.lattice, &self.settings, &mut self.slabs);
-        dispatch(self.backend, NextSlab { lattice, window, has_next: z < last, settings, slabs, out })
+        W::mesh_slab(self.backend, NextSlab { lattice, window, has_next: z < last, settings, slabs, out })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        lattice::{Samples, Shape},
+        mesher::Mesher,
+    };
+
+    #[test]
+    fn vertices_that_indices_cannot_name_are_refused() {
+        let mut mesh = MeshBuffer::new();
+        let mut mesher = SlabMesher::<i8>::new([2, 2], MeshSettings::default()).unwrap();
+        mesher.push(&[1; 4], &mut mesh).unwrap();
+        // Four vertices come between these two slabs.
+        mesher.push(&[-1; 4], &mut mesh).unwrap();
+        let mut last = mesher.clone();
+        last.slabs.vertices = u64::from(u32::MAX) - 4;
+        last.finish(&mut mesh).unwrap();
+        mesher.slabs.vertices = u64::from(u32::MAX) - 3;
+        mesh.clear();
+        let too_many = MeshError::TooManyVertices { found: u64::from(u32::MAX) + 1 };
+        assert_eq!(mesher.push(&[-1; 4], &mut mesh), Err(too_many));
+        assert_eq!((mesher.push(&[-1; 4], &mut mesh), mesh.triangle_count()), (Err(too_many), 0));
+
+        let weights = [1i8, 1, 1, 1, -1, -1, -1, -1];
+        let samples = Samples::new(Shape::cube(2).unwrap(), &weights).unwrap();
+        let mut next = Mesher { backend: None, slabs: mesher.slabs };
+        next.mesh(samples, &MeshSettings::default(), &mut mesh).unwrap();
+        assert_eq!(mesh.triangle_count(), 2);
     }
 }

@@ -1,11 +1,7 @@
 //! [`ThreadedMesher`]: one large volume on several threads.
 
 use alloc::vec::Vec;
-use core::{
-    mem::MaybeUninit,
-    num::NonZero,
-    sync::atomic::{AtomicUsize, Ordering},
-};
+use core::{mem::MaybeUninit, num::NonZero};
 use std::{
     panic::resume_unwind,
     sync::{Mutex, PoisonError},
@@ -14,24 +10,20 @@ use std::{
 
 use super::{
     MeshError, MeshSettings,
-    output::{keep, room},
+    output::{keep, room, union},
     slabs::{Lattice, Part, Slabs},
 };
-use crate::{
-    buffer::MeshBuffer,
-    lattice::Samples,
-    sample::Weight,
-    simd::{Backend, dispatch},
-};
+use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
 
-/// Parts of a volume for each thread: enough that the threads finish at about the same time where the surface lies in a few slabs.
+/// Parts of a volume for each thread: enough that the threads finish at about the same time where the surface lies in a
+/// few slabs.
 const PARTS: usize = 8;
 
 /// Meshes one large volume on several threads; keeps its scratch memory between volumes.
 ///
-/// The mesh is that of [`Mesher::mesh`](super::Mesher::mesh), byte for byte, on any number of threads; the same promises hold. The
-/// threads make parts of the mesh in memory of their own, which takes as much again as the mesh. For many small volumes, such as
-/// chunks, give each thread a `Mesher` of its own instead.
+/// The mesh is that of [`Mesher::mesh`](super::Mesher::mesh), byte for byte, on any number of threads; the same
+/// promises hold. The threads make parts of the mesh in memory of their own, which takes as much again as the mesh. For
+/// many small volumes, such as chunks, give each thread a `Mesher` of its own instead.
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshSettings, Samples, Shape, ThreadedMesher};
@@ -48,7 +40,7 @@ const PARTS: usize = 8;
 pub struct ThreadedMesher {
     threads: NonZero<usize>,
     backend: Backend,
-    parts: Vec<Mutex<MeshBuffer>>,
+    parts: Vec<MeshBuffer>,
     slabs: Vec<Slabs>,
 }
 
@@ -73,34 +65,39 @@ impl ThreadedMesher {
         let lattice = Lattice::of(&samples)?;
         let cells = lattice.size[2] - 1;
         let threads = self.threads.get().min(cells);
-        let parts = (PARTS * threads).min(cells);
-        self.parts.resize_with(parts, Mutex::default);
+        let parts = threads.saturating_mul(PARTS).min(cells);
+        self.parts.resize_with(parts, MeshBuffer::new);
         self.slabs.resize_with(threads, Slabs::new);
 
-        let (backend, buffers, next) = (self.backend, &self.parts, AtomicUsize::new(0));
+        let backend = self.backend;
+        let start_of = |part: usize| (cells as u64 * part as u64 / parts as u64) as usize;
+        let queue = Mutex::new(self.parts.iter_mut().enumerate());
         let work = |slabs: &mut Slabs| {
-            loop {
-                let part = next.fetch_add(1, Ordering::Relaxed);
-                let Some(buffer) = buffers.get(part) else { return Ok(()) };
-                let out = &mut *buffer.lock().unwrap_or_else(PoisonError::into_inner);
+            while let Some((part, out)) = next(&queue) {
                 out.clear();
-                let cells = cells * part / parts..cells * (part + 1) / parts;
-                dispatch(backend, Part { samples, lattice, cells, settings, slabs, out })?;
+                let cells = start_of(part)..start_of(part + 1);
+                W::mesh_part(backend, Part { samples, lattice, cells, settings, slabs, out })?;
             }
+            Ok(())
         };
         let work = &work;
         on_threads(self.slabs.iter_mut().map(|slabs| move || work(slabs)))?;
-        let parts = self.parts.iter_mut().map(|part| &*part.get_mut().unwrap_or_else(PoisonError::into_inner));
-        concatenate(&parts.collect::<Vec<_>>(), threads, out)
+        concatenate(&self.parts, threads, out)
     }
 }
 
-/// Runs all of `jobs` at once, the first of them on this thread, and returns the first error.
-fn on_threads<J: FnOnce() -> Result<(), MeshError> + Send>(jobs: impl Iterator<Item = J>) -> Result<(), MeshError> {
-    let mut jobs = jobs;
+/// What comes next in a queue that several threads share.
+fn next<I: Iterator>(queue: &Mutex<I>) -> Option<I::Item> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner).next()
+}
+
+/// Runs all of `jobs` at once, the first of them on this thread, and returns an error where there is one. Where the
+/// system has no more threads to give, fewer jobs run: each must be able to do the work of all.
+fn on_threads<J: FnOnce() -> Result<(), MeshError> + Send>(mut jobs: impl Iterator<Item = J>) -> Result<(), MeshError> {
     let Some(own) = jobs.next() else { return Ok(()) };
     thread::scope(|scope| {
-        let others: Vec<_> = jobs.map(|job| scope.spawn(job)).collect();
+        let others = jobs.filter_map(|job| thread::Builder::new().spawn_scoped(scope, job).ok());
+        let others: Vec<_> = others.collect();
         let mut result = own();
         for other in others {
             let other = other.join().unwrap_or_else(|panic| resume_unwind(panic));
@@ -124,8 +121,8 @@ struct Piece<'a> {
 /// Writes `parts` to `out`, which is empty, one behind the other.
 ///
 /// Indices that count the vertices of a part run on into the next part's at its end: those come right behind.
-fn concatenate(parts: &[&MeshBuffer], threads: usize, out: &mut MeshBuffer) -> Result<(), MeshError> {
-    let sum = |len: fn(&MeshBuffer) -> usize| parts.iter().map(|part| len(part)).sum::<usize>();
+fn concatenate(parts: &[MeshBuffer], threads: usize, out: &mut MeshBuffer) -> Result<(), MeshError> {
+    let sum = |len: fn(&MeshBuffer) -> usize| parts.iter().map(len).sum::<usize>();
     let lens = [sum(|part| part.positions.len()), sum(|part| part.normals.len()), sum(|part| part.materials.len())];
     let indices_len = sum(|part| part.indices.len());
     if u32::try_from(lens[0]).is_err() {
@@ -135,7 +132,7 @@ fn concatenate(parts: &[&MeshBuffer], threads: usize, out: &mut MeshBuffer) -> R
     let (mut materials, mut indices) = (room(&mut out.materials, lens[2]), room(&mut out.indices, indices_len));
     let mut base = 0;
     let mut pieces = Vec::new();
-    for &part in parts {
+    for part in parts {
         pieces.push(Piece {
             part,
             base,
@@ -145,18 +142,11 @@ fn concatenate(parts: &[&MeshBuffer], threads: usize, out: &mut MeshBuffer) -> R
             indices: take(&mut indices, part.indices.len()),
         });
         base += part.positions.len() as u32;
-        out.bounds = match (out.bounds, part.bounds) {
-            (Some([min, max]), Some([low, high])) => Some([
-                core::array::from_fn(|axis| min[axis].min(low[axis])),
-                core::array::from_fn(|axis| max[axis].max(high[axis])),
-            ]),
-            (bounds, None) | (None, bounds) => bounds,
-        };
+        out.bounds = union(out.bounds, part.bounds);
     }
     let pieces = Mutex::new(pieces.into_iter());
-    let next = || pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
     let work = || {
-        while let Some(piece) = next() {
+        while let Some(piece) = next(&pieces) {
             piece.positions.write_copy_of_slice(&piece.part.positions);
             piece.normals.write_copy_of_slice(&piece.part.normals);
             piece.materials.write_copy_of_slice(&piece.part.materials);

@@ -2,10 +2,10 @@
 //!
 //! No map and no search. The vertices of a slab are numbered by their edges' axis, then row by row; every crossing
 //! belongs to an active cell; so counters that each active cell advances by its own crossings always stand at the next
-//! vertex, and run on from row to row. There are eight: four for the cell's edges along x, and four for those along y and z on its low
-//! side. The high side needs none: there the next vertex is the one behind the low side's. Behind each row comes a code that
-//! is no cell: it takes the counters past the crossings on the row's last samples, which are on no cell's low side. It is the
-//! case of a cell whose high side repeats these samples, moved up.
+//! vertex, and run on from row to row. There are eight: four for the cell's edges along x, and four for those along y
+//! and z on its low side. The high side needs none: there the next vertex is the one behind the low side's. Behind each
+//! row comes a code that is no cell: it takes the counters past the crossings on the row's last samples, which are on
+//! no cell's low side. It is the case of a cell whose high side repeats these samples, moved up.
 
 use alloc::vec::Vec;
 
@@ -17,13 +17,14 @@ use super::{
 };
 use crate::{
     cases::{CROSSED_EDGES, TRIANGLE_COUNTS, TRIANGLES},
-    simd::{CODES, Cell, Simd},
+    simd::{CODES, Recipe, Simd},
 };
 
 /// Codes of cells are their cases; behind these come those that close a row.
 const CLOSING: u16 = 256;
 
-/// Codes that are gathered before they become triangles: enough to make the loop over them long, few enough to stay in the first cache.
+/// Codes that are gathered before they become triangles: enough to make the loop over them long, few enough to stay in
+/// the first cache.
 const GATHERED: usize = 256;
 
 /// The first vertices of two neighbouring slabs on their edges along x and y, and on those along z between them.
@@ -103,7 +104,7 @@ pub(super) fn crossings(low: &[u64], high: &[u64]) -> u64 {
 
 #[inline(always)]
 fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>) {
-    let kept = S::triangles(&CELLS, codes, counters, room(indices, 16 * codes.len()));
+    let kept = S::triangles(&RECIPES, codes, counters, room(indices, 16 * codes.len()));
     // SAFETY: the backend has written them.
     #[expect(unsafe_code, reason = "spares filling the vector with zeros first")]
     unsafe {
@@ -112,8 +113,8 @@ fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>
 }
 
 /// What each code adds to the mesh.
-static CELLS: [Cell; CODES] = {
-    let mut rows = [Cell { vertices: [0; 16], steps: [0; 8], count: 0 }; CODES];
+static RECIPES: [Recipe; CODES] = {
+    let mut rows = [Recipe { vertices: [0; 16], steps: [0; 8], count: 0 }; CODES];
     let mut case = 0;
     while case < 256 {
         let crossed = CROSSED_EDGES[case];
@@ -124,7 +125,7 @@ static CELLS: [Cell; CODES] = {
                 edge as u8
             } else {
                 let (low, high) = (edge & !1, edge & 1);
-                (4 + (low - 4) / 2 | high << 3 | (high & (crossed >> low & 1) as usize) << 4) as u8
+                ((4 + (low - 4) / 2) | high << 3 | (high & (crossed >> low & 1) as usize) << 4) as u8
             };
             index += 1;
         }
@@ -144,4 +145,18 @@ static CELLS: [Cell; CODES] = {
         case += 1;
     }
     rows
+};
+
+/// What the backends rely on.
+const _: () = {
+    let mut code = 0;
+    while code < CODES {
+        assert!(RECIPES[code].count <= 15);
+        let mut index = 0;
+        while index < 16 {
+            assert!(RECIPES[code].vertices[index] < 32);
+            index += 1;
+        }
+        code += 1;
+    }
 };

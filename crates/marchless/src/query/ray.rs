@@ -12,7 +12,8 @@ pub(super) struct Ray {
 }
 
 impl Ray {
-    /// `None` where a number is NaN, the origin or direction is infinite, the direction is zero, or the length is negative.
+    /// `None` where a number is NaN, the origin or direction is infinite, the direction is zero, or the length is
+    /// negative.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], max_distance: f64) -> Option<Self> {
         let is_finite = origin.iter().chain(&direction).all(|v| v.is_finite());
         let largest = direction.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
@@ -75,8 +76,8 @@ impl Ray {
     /// Where the ray crosses a triangle, from either side. `triangle`: its corners, counted from lattice point `base`,
     /// counter-clockwise as seen from outside.
     ///
-    /// Rays between two triangles that share an edge hit one of them: Sven Woop, Carsten Benthin and Ingo Wald, "Watertight
-    /// Ray/Triangle Intersection" (2013).
+    /// Rays between two triangles that share an edge hit one of them: Sven Woop, Carsten Benthin and Ingo Wald,
+    /// "Watertight Ray/Triangle Intersection" (2013).
     pub(super) fn cross(&self, triangle: [[f32; 3]; 3], base: [i32; 3]) -> Option<Crossing> {
         // Seen along the ray's main axis z, sheared so that the ray runs along it.
         let d = self.direction;

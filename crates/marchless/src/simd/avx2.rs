@@ -6,7 +6,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, Cell, Job, Simd, all, portable::Portable};
+use super::{CODES, Job, Recipe, Simd, all, portable::Portable};
 
 pub(super) fn is_available() -> bool {
     all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt")
@@ -60,13 +60,13 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn triangles(
-        cells: &[Cell; CODES],
+        recipes: &[Recipe; CODES],
         codes: &[u16],
         counters: &mut [u32; 8],
         indices: &mut [MaybeUninit<u32>],
     ) -> usize {
         // SAFETY: within `run`.
-        unsafe { self::triangles(cells, codes, counters, indices) }
+        unsafe { self::triangles(recipes, codes, counters, indices) }
     }
 }
 
@@ -153,18 +153,23 @@ fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn triangles(cells: &[Cell; CODES], codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+fn triangles(
+    recipes: &[Recipe; CODES],
+    codes: &[u16],
+    counters: &mut [u32; 8],
+    indices: &mut [MaybeUninit<u32>],
+) -> usize {
     assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
     let mut end = 0;
     // SAFETY: the load is all of the counters.
     let mut running = unsafe { _mm256_loadu_si256(counters.as_ptr().cast()) };
     for &code in codes {
-        let cell = &cells[usize::from(code) % CODES];
+        let recipe = &recipes[usize::from(code) % CODES];
         for half in [0, 8] {
-            // SAFETY: the load is half of the vertices. `end` grows by 15 a code at most, so that the 16 indices from it on lie within
-            // what was asserted.
+            // SAFETY: the load is half of the vertices. `end` grows by 15 a code at most, so that the 16 indices from
+            // it on lie within what was asserted.
             unsafe {
-                let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(cell.vertices.as_ptr().add(half).cast()));
+                let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(recipe.vertices.as_ptr().add(half).cast()));
                 // The permutation looks at bits 0 to 2 only.
                 let first = _mm256_permutevar8x32_epi32(running, vertices);
                 let indices_of_half = _mm256_add_epi32(first, _mm256_srli_epi32::<4>(vertices));
@@ -173,8 +178,8 @@ fn triangles(cells: &[Cell; CODES], codes: &[u16], counters: &mut [u32; 8], indi
         }
         // SAFETY: the load is all of the eight steps.
         running =
-            _mm256_add_epi32(running, _mm256_cvtepu8_epi32(unsafe { _mm_loadl_epi64(cell.steps.as_ptr().cast()) }));
-        end += usize::from(cell.count);
+            _mm256_add_epi32(running, _mm256_cvtepu8_epi32(unsafe { _mm_loadl_epi64(recipe.steps.as_ptr().cast()) }));
+        end += usize::from(recipe.count);
     }
     // SAFETY: the store is all of the counters.
     unsafe { _mm256_storeu_si256(counters.as_mut_ptr().cast(), running) }

@@ -6,7 +6,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, Cell, Job, Simd, all};
+use super::{CODES, Job, Recipe, Simd, all};
 
 pub(super) fn is_available() -> bool {
     all!("avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vbmi2", "bmi1", "bmi2", "lzcnt", "popcnt")
@@ -61,13 +61,13 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn triangles(
-        cells: &[Cell; CODES],
+        recipes: &[Recipe; CODES],
         codes: &[u16],
         counters: &mut [u32; 8],
         indices: &mut [MaybeUninit<u32>],
     ) -> usize {
         // SAFETY: within `run`.
-        unsafe { self::triangles(cells, codes, counters, indices) }
+        unsafe { self::triangles(recipes, codes, counters, indices) }
     }
 }
 
@@ -169,25 +169,30 @@ fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
 
 #[inline]
 #[target_feature(enable = "avx512f")]
-fn triangles(cells: &[Cell; CODES], codes: &[u16], counters: &mut [u32; 8], indices: &mut [MaybeUninit<u32>]) -> usize {
+fn triangles(
+    recipes: &[Recipe; CODES],
+    codes: &[u16],
+    counters: &mut [u32; 8],
+    indices: &mut [MaybeUninit<u32>],
+) -> usize {
     assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
     let mut end = 0;
     // The counters twice, so that bit 3 of a lane's number makes no difference.
     // SAFETY: the load is all of the counters.
     let mut running = _mm512_broadcast_i64x4(unsafe { _mm256_loadu_si256(counters.as_ptr().cast()) });
     for &code in codes {
-        let cell = &cells[usize::from(code) % CODES];
-        // SAFETY: the loads are all of the vertices and all of the eight steps. `end` grows by 15 a code at most, so that the 16 indices
-        // from it on lie within what was asserted.
+        let recipe = &recipes[usize::from(code) % CODES];
+        // SAFETY: the loads are all of the vertices and all of the eight steps. `end` grows by 15 a code at most, so
+        // that the 16 indices from it on lie within what was asserted.
         unsafe {
-            let vertices = _mm512_cvtepu8_epi32(_mm_loadu_si128(cell.vertices.as_ptr().cast()));
+            let vertices = _mm512_cvtepu8_epi32(_mm_loadu_si128(recipe.vertices.as_ptr().cast()));
             let first = _mm512_permutexvar_epi32(vertices, running);
             let indices_of_cell = _mm512_add_epi32(first, _mm512_srli_epi32::<4>(vertices));
             _mm512_storeu_si512(indices.as_mut_ptr().add(end).cast(), indices_of_cell);
-            let steps = _mm_loadl_epi64(cell.steps.as_ptr().cast());
+            let steps = _mm_loadl_epi64(recipe.steps.as_ptr().cast());
             running = _mm512_add_epi32(running, _mm512_cvtepu8_epi32(_mm_unpacklo_epi64(steps, steps)));
         }
-        end += usize::from(cell.count);
+        end += usize::from(recipe.count);
     }
     // SAFETY: the store is all of the counters.
     unsafe { _mm256_storeu_si256(counters.as_mut_ptr().cast(), _mm512_castsi512_si256(running)) }

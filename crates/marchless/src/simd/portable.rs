@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::{CODES, Cell, Simd};
+use super::{CODES, Recipe, Simd};
 
 pub(super) struct Portable;
 
@@ -56,34 +56,32 @@ impl Simd for Portable {
 
     #[inline(always)]
     fn triangles(
-        cells: &[Cell; CODES],
+        recipes: &[Recipe; CODES],
         codes: &[u16],
         counters: &mut [u32; 8],
         indices: &mut [MaybeUninit<u32>],
     ) -> usize {
         let (mut end, mut running) = (0, *counters);
         for &code in codes {
-            let cell = &cells[usize::from(code) % CODES];
+            let recipe = &recipes[usize::from(code) % CODES];
             let [a, b, c, d, e, f, g, h] = running;
-            for (counter, step) in running.iter_mut().zip(cell.steps) {
-                *counter += u32::from(step);
+            for (counter, step) in running.iter_mut().zip(recipe.steps) {
+                *counter = counter.wrapping_add(step.into());
             }
             let [.., high_e, high_f, high_g, high_h] = running;
             let vertices = [a, b, c, d, e, f, g, h, 0, 0, 0, 0, high_e, high_f, high_g, high_h];
-            if let Some(indices) = indices[end..].first_chunk_mut::<16>() {
-                for (index, vertex) in indices.iter_mut().zip(cell.vertices) {
-                    index.write(vertices[usize::from(vertex) % 16]);
-                }
+            for (index, vertex) in indices[end..end + 16].iter_mut().zip(recipe.vertices) {
+                index.write(vertices[usize::from(vertex) % 16]);
             }
-            end += usize::from(cell.count);
+            end += usize::from(recipe.count);
         }
         *counters = running;
         end
     }
 }
 
-/// Each comparison becomes a byte first, in a loop that the compiler turns into vector compares; one multiplication then
-/// gathers the lowest bits of eight bytes.
+/// Each comparison becomes a byte first, in a loop that the compiler turns into vector compares; one multiplication
+/// then gathers the lowest bits of eight bytes.
 #[inline(always)]
 fn below<W: Copy + PartialOrd>(weights: &[W; 32], threshold: W) -> u32 {
     let mut bytes = [0u8; 32];

@@ -1,16 +1,16 @@
-//! SSE2, which every x86-64 has: signs sixteen at a time and counters four at a time, the rest as in the portable backend.
+//! SSE2: signs sixteen at a time and counters four at a time, the rest as in the portable backend.
 #![expect(unsafe_code, reason = "vector loads take raw pointers")]
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, Cell, Simd, portable::Portable};
+use super::{CODES, Recipe, Simd, portable::Portable};
 
 pub(super) struct Sse2;
 
 impl Simd for Sse2 {
     #[inline(always)]
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
-        // SAFETY: SSE2 is there on every x86-64; both loads lie within the 32 weights.
+        // SAFETY: SSE2 is available; both loads lie within the 32 weights.
         unsafe {
             let threshold = _mm_set1_epi8(threshold);
             let load = |index: usize| _mm_loadu_si128(weights.as_ptr().add(16 * index).cast());
@@ -21,7 +21,7 @@ impl Simd for Sse2 {
 
     #[inline(always)]
     fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
-        // SAFETY: SSE2 is there on every x86-64; all loads lie within the 32 weights.
+        // SAFETY: SSE2 is available; all loads lie within the 32 weights.
         unsafe {
             let threshold = _mm_set1_epi16(threshold);
             let below =
@@ -33,7 +33,7 @@ impl Simd for Sse2 {
 
     #[inline(always)]
     fn below_f32(weights: &[f32; 32], threshold: f32) -> u32 {
-        // SAFETY: SSE2 is there on every x86-64; all loads lie within the 32 weights.
+        // SAFETY: SSE2 is available; all loads lie within the 32 weights.
         unsafe {
             let threshold = _mm_set1_ps(threshold);
             let below =
@@ -61,16 +61,16 @@ impl Simd for Sse2 {
 
     #[inline(always)]
     fn triangles(
-        cells: &[Cell; CODES],
+        recipes: &[Recipe; CODES],
         codes: &[u16],
         counters: &mut [u32; 8],
         indices: &mut [MaybeUninit<u32>],
     ) -> usize {
         assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
         let mut end = 0;
-        // SAFETY: SSE2 is there on every x86-64. The loads and stores are halves of the counters, all of the eight steps, and quarters of
-        // `vertices`. The 15 entries of a cell are less than 32. `end` grows by 15 a code at most, so that the 15
-        // indices from it on lie within what was asserted.
+        // SAFETY: SSE2 is available. The loads and stores are halves of the counters, all of the eight steps, and
+        // quarters of `vertices`. The 15 entries of a cell are less than 32. `end` grows by 15 a code at most, so that
+        // the 15 indices from it on lie within what was asserted.
         unsafe {
             let zero = _mm_setzero_si128();
             let mut x = _mm_loadu_si128(counters.as_ptr().cast());
@@ -78,18 +78,18 @@ impl Simd for Sse2 {
             // By the five bits of an entry: the high side stands where bit 3 is set, whatever bit 4 is.
             let mut vertices = [0u32; 32];
             for &code in codes {
-                let cell = &cells[usize::from(code) % CODES];
-                let steps = _mm_unpacklo_epi8(_mm_loadl_epi64(cell.steps.as_ptr().cast()), zero);
+                let recipe = &recipes[usize::from(code) % CODES];
+                let steps = _mm_unpacklo_epi8(_mm_loadl_epi64(recipe.steps.as_ptr().cast()), zero);
                 _mm_storeu_si128(vertices.as_mut_ptr().cast(), x);
                 _mm_storeu_si128(vertices.as_mut_ptr().add(4).cast(), low);
                 x = _mm_add_epi32(x, _mm_unpacklo_epi16(steps, zero));
                 low = _mm_add_epi32(low, _mm_unpackhi_epi16(steps, zero));
                 _mm_storeu_si128(vertices.as_mut_ptr().add(12).cast(), low);
                 _mm_storeu_si128(vertices.as_mut_ptr().add(28).cast(), low);
-                for (index, &vertex) in cell.vertices[..15].iter().enumerate() {
+                for (index, &vertex) in recipe.vertices[..15].iter().enumerate() {
                     indices.get_unchecked_mut(end + index).write(*vertices.get_unchecked(usize::from(vertex)));
                 }
-                end += usize::from(cell.count);
+                end += usize::from(recipe.count);
             }
             _mm_storeu_si128(counters.as_mut_ptr().cast(), x);
             _mm_storeu_si128(counters.as_mut_ptr().add(4).cast(), low);

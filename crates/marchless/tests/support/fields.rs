@@ -7,16 +7,18 @@ use proptest::{collection::vec, prelude::*, sample::select};
 #[derive(Clone, Debug)]
 pub(crate) struct Field<W> {
     pub(crate) shape: Shape,
-    pub(crate) weights: Vec<W>,
-    pub(crate) materials: Vec<u8>,
+    /// In memory of just their size, so that AddressSanitizer sees a read behind the last one.
+    pub(crate) weights: Box<[W]>,
+    pub(crate) materials: Box<[u8]>,
     pub(crate) padded: bool,
     pub(crate) isovalue: f32,
 }
 
 impl<W: TestWeight> Field<W> {
-    /// Any field: white noise of a few or of all weights, sparse or dense.
+    /// Any field: white noise of a few or of all weights, sparse or dense; layers of slabs that are all inside or outside but
+    /// for a sample or so.
     pub(crate) fn any() -> impl Strategy<Value = Self> {
-        (sizes(), any::<bool>(), 0..4usize).prop_flat_map(|(size, padded, kind)| {
+        (sizes(), any::<bool>(), 0..5usize).prop_flat_map(|(size, padded, kind)| {
             let shape = Shape::new(size.map(|n| n + 2 * u32::from(padded))).expect("the sizes are small");
             let weight = match kind {
                 0 => select(W::NEAR_ZERO).boxed(),
@@ -31,13 +33,16 @@ impl<W: TestWeight> Field<W> {
                 W::all().prop_map(W::to_voxels),
                 select(vec![f32::MIN, f32::MAX, 1e-40]),
             ];
-            (vec(weight, shape.len()), vec(0..4u8, shape.len()), isovalue).prop_map(
-                move |(weights, materials, isovalue)| Self {
-                    shape,
-                    weights,
-                    materials,
-                    padded,
-                    isovalue: if isovalue.is_finite() { isovalue } else { 0.0 },
+            let len = shape.len();
+            let layers = (vec(0..10u8, shape.size()[2] as usize), vec((0..len, select(W::NEAR_ZERO)), 0..4));
+            (vec(weight, len), layers, vec(0..4u8, len), isovalue).prop_map(
+                move |(mut weights, (turns, exceptions), materials, isovalue)| {
+                    if kind == 4 {
+                        layer(&mut weights, shape, &turns);
+                        exceptions.into_iter().for_each(|(index, weight)| weights[index] = weight);
+                    }
+                    let isovalue = if isovalue.is_finite() { isovalue } else { 0.0 };
+                    Self { shape, weights: weights.into(), materials: materials.into(), padded, isovalue }
                 },
             )
         })
@@ -56,14 +61,28 @@ impl<W: TestWeight> Field<W> {
     }
 }
 
+/// Fills each slab with one weight, mostly that of the slab below.
+fn layer<W: Weight>(weights: &mut [W], shape: Shape, turns: &[u8]) {
+    let mut weight = W::OUTSIDE;
+    for (slab, &turn) in weights.chunks_mut(shape.strides()[2]).zip(turns) {
+        if turn >= 7 {
+            weight = if weight == W::OUTSIDE { W::INSIDE } else { W::OUTSIDE };
+        }
+        slab.fill(weight);
+    }
+}
+
 /// Meshed samples per axis: rows of less than a word, of about half a word, a word and two, the other axes short.
 fn sizes() -> impl Strategy<Value = [u32; 3]> {
     let row = prop_oneof![4 => 2..8u32, 1 => 30..40u32, 1 => 62..68u32, 1 => 126..131u32];
-    (row, 2..6u32, 2..6u32, 0..3usize).prop_map(|(long, a, b, turn)| {
+    let any = (row, 2..6u32, 2..6u32, 0..3usize).prop_map(|(long, a, b, turn)| {
         let mut size = [long, a, b];
         size.rotate_right(turn);
         size
-    })
+    });
+    // Words of rows beyond a block of 64.
+    let broad = (126..131u32, 24..30u32, 2..4u32).prop_map(|(x, y, z)| [x, y, z]);
+    prop_oneof![12 => any, 1 => broad]
 }
 
 /// Weights worth testing.
