@@ -31,7 +31,7 @@ fn check<W: FuzzWeight>(volume: &Volume<W>, threads: u8) {
     }
 
     let (plain, mut mesh) = (Bits::of(&plain), MeshBuffer::new());
-    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+    for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
         // A mesher that has seen something else must not remember it.
         let mut mesher = Mesher::with_backend(backend);
         let turned_over = MeshSettings { isovalue: -settings.isovalue, normals: !settings.normals };

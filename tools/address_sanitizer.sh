@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Runs the tests that reach all of the core's unsafe code with AddressSanitizer: a read or a write beyond a buffer ends
+# them. Needs a nightly toolchain; skips without one.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+if ! rustup toolchain list 2>/dev/null | grep -q '^nightly'; then
+    echo "skipped: AddressSanitizer needs a nightly toolchain"
+    exit 0
+fi
+host="$(rustc +nightly --version --verbose | sed -n 's/^host: //p')"
+target="$(realpath -m "${CARGO_TARGET_DIR:-target}")/address_sanitizer"
+
+# For a named target, flags leave build scripts and procedural macros alone.
+RUSTFLAGS="-Zsanitizer=address" cargo +nightly test --quiet --locked --target "$host" --target-dir "$target" \
+    --package marchless --test backends --test oracle --test surface
+echo "AddressSanitizer: no read or write beyond a buffer"
