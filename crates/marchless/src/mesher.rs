@@ -34,8 +34,8 @@ use crate::{
     sample::Weight,
     simd::Backend,
 };
-use slabs::{Lattice, Slabs};
-pub(crate) use slabs::{NextSlab, Part};
+pub(crate) use slabs::Meshing;
+use slabs::{Input, Lattice, Slabs};
 pub use stream::SlabMesher;
 #[cfg(feature = "std")]
 pub use threads::ThreadedMesher;
@@ -126,8 +126,8 @@ impl Mesher {
         settings.check()?;
         let lattice = Lattice::of(&samples)?;
         let backend = *self.backend.get_or_insert_with(Backend::fastest);
-        let cells = 0..lattice.size[2] - 1;
-        let meshed = W::mesh_part(backend, Part { samples, lattice, cells, settings, slabs: &mut self.slabs, out });
+        let input = Input::Volume { samples, cells: 0..lattice.size[2] - 1 };
+        let meshed = W::mesh(backend, Meshing { input, lattice, settings, slabs: &mut self.slabs, out });
         if meshed.is_err() {
             out.clear();
         }

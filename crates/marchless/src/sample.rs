@@ -3,7 +3,7 @@
 use core::fmt::Debug;
 
 use crate::{
-    mesher::{MeshError, NextSlab, Part},
+    mesher::{MeshError, Meshing},
     simd::{Backend, Simd, dispatch},
 };
 
@@ -54,7 +54,7 @@ pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private:
 /// What the passes need of a weight, out of the users' reach.
 pub(crate) mod private {
     use crate::{
-        mesher::{MeshError, NextSlab, Part},
+        mesher::{MeshError, Meshing},
         simd::{Backend, Simd},
     };
 
@@ -92,23 +92,10 @@ pub(crate) mod private {
         fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
         /// The sample as a finite number, for the rare gradients that overflow.
         fn finite(self) -> f64;
-        /// Meshes a part of a volume, or the next of many slabs. Here, and not generic, so that the passes are compiled in
-        /// this crate, once, with its level of optimisation.
-        fn mesh_part(backend: Backend, part: Part<'_, Self>) -> Result<(), MeshError>;
-        fn mesh_slab(backend: Backend, slab: NextSlab<'_, Self>) -> Result<(), MeshError>;
+        /// Meshes slabs. Here, and not generic, so that the passes are compiled in this crate, once, with its level of
+        /// optimisation.
+        fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError>;
     }
-}
-
-macro_rules! compiled_here {
-    () => {
-        fn mesh_part(backend: Backend, part: Part<'_, Self>) -> Result<(), MeshError> {
-            dispatch(backend, part)
-        }
-
-        fn mesh_slab(backend: Backend, slab: NextSlab<'_, Self>) -> Result<(), MeshError> {
-            dispatch(backend, slab)
-        }
-    };
 }
 
 macro_rules! integer_weight {
@@ -224,7 +211,9 @@ macro_rules! integer_weight {
                 f64::from(self)
             }
 
-            compiled_here!();
+            fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError> {
+                dispatch(backend, meshing)
+            }
         }
     };
 }
@@ -333,7 +322,9 @@ impl private::Sealed for f32 {
         if self.is_nan() { f64::from(Self::MAX) } else { f64::from(self.clamp(Self::MIN, Self::MAX)) }
     }
 
-    compiled_here!();
+    fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError> {
+        dispatch(backend, meshing)
+    }
 }
 
 /// Whether `f32` computes well with a number of this size. Has no branch.

@@ -208,71 +208,64 @@ pub(super) enum Place {
     Beyond,
 }
 
-/// The cells between some slabs of a volume.
-pub struct Part<'a, W> {
-    pub(super) samples: Samples<'a, W>,
+/// Slabs to be meshed.
+pub struct Meshing<'a, W> {
+    pub(super) input: Input<'a, W>,
     pub(super) lattice: Lattice,
-    /// Cells along z; not empty.
-    pub(super) cells: Range<usize>,
     pub(super) settings: &'a MeshSettings,
     pub(super) slabs: &'a mut Slabs,
     pub(super) out: &'a mut MeshBuffer,
 }
 
-impl<W: Weight> Job for Part<'_, W> {
+/// Where slabs come from.
+pub(super) enum Input<'a, W> {
+    /// All of a volume, or the part of it that has these cells along z; they are not empty.
+    Volume { samples: Samples<'a, W>, cells: Range<usize> },
+    /// One slab of many that come one by one, and whether another one will come.
+    Stream { window: Window<'a, W>, has_next: bool },
+}
+
+impl<W: Weight> Job for Meshing<'_, W> {
     type Output = Result<(), MeshError>;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Self::Output {
-        let Self { samples, lattice, cells, settings, slabs, out } = self;
-        let is_last_part = cells.end + 1 == lattice.size[2];
-        // Slabs alike from the first on have no surface: the last of them will do.
-        let padding = usize::from(lattice.padded);
-        let given = &samples.weights()[(cells.start + padding) * lattice.len..(cells.end + 1 + padding) * lattice.len];
-        let alike = classify::alike::<S, W>(given, W::threshold(settings.isovalue)) / lattice.len;
-        let start = cells.start + alike.saturating_sub(1);
-        if start == cells.end {
-            return Ok(());
-        }
+        let Self { input, lattice, settings, slabs, out } = self;
+        let (start, end) = match &input {
+            Input::Stream { window, .. } => (window.z, window.z),
+            Input::Volume { samples, cells } => {
+                // Slabs alike from the first on have no surface: the last of them will do.
+                let slabs = cells.start..cells.end + 1;
+                let padding = usize::from(lattice.padded);
+                let given =
+                    &samples.weights()[(slabs.start + padding) * lattice.len..(slabs.end + padding) * lattice.len];
+                let alike = classify::alike::<S, W>(given, W::threshold(settings.isovalue)) / lattice.len;
+                if alike == slabs.len() {
+                    return Ok(());
+                }
+                (cells.start + alike.saturating_sub(1), cells.end)
+            }
+        };
         let mut pass = Vertices::new();
-        for z in start..cells.end + 1 {
-            let place = if z == start {
-                Place::First
-            } else if z == cells.end && !is_last_part {
-                Place::Beyond
-            } else {
-                Place::Next
+        for z in start..end + 1 {
+            let (window, place, has_next) = match &input {
+                Input::Stream { window, has_next } => {
+                    (*window, if z == 0 { Place::First } else { Place::Next }, *has_next)
+                }
+                Input::Volume { samples, .. } => {
+                    let place = if z == start {
+                        Place::First
+                    } else if z == end && end + 1 < lattice.size[2] {
+                        Place::Beyond
+                    } else {
+                        Place::Next
+                    };
+                    (Window::of(samples, &lattice, z), place, z < end)
+                }
             };
-            let window = Window::of(&samples, &lattice, z);
-            let next = (z < cells.end).then_some(window.slabs[3]);
+            let next = has_next.then_some(window.slabs[3]);
             slabs.step::<S, W>(&lattice, &window, place, next, settings, &mut pass, out)?;
         }
-        pass.bounds.widen(out);
-        Ok(())
-    }
-}
-
-/// One slab of many that come one by one.
-pub struct NextSlab<'a, W> {
-    pub(super) lattice: &'a Lattice,
-    pub(super) window: Window<'a, W>,
-    /// Whether another one will come.
-    pub(super) has_next: bool,
-    pub(super) settings: &'a MeshSettings,
-    pub(super) slabs: &'a mut Slabs,
-    pub(super) out: &'a mut MeshBuffer,
-}
-
-impl<W: Weight> Job for NextSlab<'_, W> {
-    type Output = Result<(), MeshError>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Self::Output {
-        let Self { lattice, window, has_next, settings, slabs, out } = self;
-        let place = if window.z == 0 { Place::First } else { Place::Next };
-        let next = has_next.then_some(window.slabs[3]);
-        let mut pass = Vertices::new();
-        slabs.step::<S, W>(lattice, &window, place, next, settings, &mut pass, out)?;
         pass.bounds.widen(out);
         Ok(())
     }

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use super::{
     MeshError, MeshSettings,
-    slabs::{Lattice, NextSlab, Slabs, Window},
+    slabs::{Input, Lattice, Meshing, Slabs, Window},
 };
 use crate::{buffer::MeshBuffer, sample::Weight, simd::Backend};
 
@@ -100,8 +100,9 @@ impl<W: Weight> SlabMesher<W> {
             z,
             one_sided: [z <= 1, z == 0 || z == last],
         };
-        let (lattice, settings, slabs) = (&self.lattice, &self.settings, &mut self.slabs);
-        W::mesh_slab(self.backend, NextSlab { lattice, window, has_next: z < last, settings, slabs, out })
+        let input = Input::Stream { window, has_next: z < last };
+        let (settings, slabs) = (&self.settings, &mut self.slabs);
+        W::mesh(self.backend, Meshing { input, lattice: self.lattice, settings, slabs, out })
     }
 }
 

@@ -11,7 +11,7 @@ use std::{
 use super::{
     MeshError, MeshSettings,
     output::{keep, room, union},
-    slabs::{Lattice, Part, Slabs},
+    slabs::{Input, Lattice, Meshing, Slabs},
 };
 use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
 
@@ -75,8 +75,8 @@ impl ThreadedMesher {
         let work = |slabs: &mut Slabs| {
             while let Some((part, out)) = next(&queue) {
                 out.clear();
-                let cells = start_of(part)..start_of(part + 1);
-                W::mesh_part(backend, Part { samples, lattice, cells, settings, slabs, out })?;
+                let input = Input::Volume { samples, cells: start_of(part)..start_of(part + 1) };
+                W::mesh(backend, Meshing { input, lattice, settings, slabs, out })?;
             }
             Ok(())
         };

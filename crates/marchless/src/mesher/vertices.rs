@@ -97,30 +97,36 @@ impl<W: Weight> Vertices<W> {
         high: &[u64],
         out: &mut MeshBuffer,
     ) -> u64 {
-        let (mut made, mut gathered, mut crossed) = (0, 0, [0; 64]);
-        for (block, (low, high)) in low.chunks(64).zip(high.chunks(64)).enumerate() {
-            for (crossed, (low, high)) in crossed.iter_mut().zip(low.iter().zip(high)) {
-                *crossed = low ^ high;
-            }
-            let mut words = S::nonzero(filled(&mut crossed, low.len()));
-            while words != 0 {
+        let mut made = 0;
+        let mut blocks = low.chunks(64).zip(high.chunks(64));
+        // Of the present block: its first word, its words' crossings, and those that are not zero and not done.
+        let (mut start, mut crossed, mut words) = (0, [0; 64], 0u64);
+        let mut next_start = 0;
+        loop {
+            let mut gathered = 0;
+            while gathered < GATHERED {
+                if words == 0 {
+                    let Some((low, high)) = blocks.next() else { break };
+                    for (crossed, (low, high)) in crossed.iter_mut().zip(low.iter().zip(high)) {
+                        *crossed = low ^ high;
+                    }
+                    words = S::nonzero(filled(&mut crossed, low.len()));
+                    (start, next_start) = (next_start, next_start + 64);
+                    continue;
+                }
                 let word = words.trailing_zeros() as usize;
                 words &= words - 1;
-                let (y, x) = lattice.place_of(64 * block + word);
+                let (y, x) = lattice.place_of(start + word);
                 let (xs, ys) = (self.x[gathered..].first_chunk_mut(), self.y[gathered..].first_chunk_mut());
                 let (xs, ys) = xs.zip(ys).expect("there is room for another word's");
                 gathered += S::positions(crossed[word % 64], x, y, xs, ys);
-                if gathered >= GATHERED {
-                    self.flush::<AXIS>(lattice, planes, settings, gathered, out);
-                    made += gathered;
-                    gathered = 0;
-                }
             }
-        }
-        if gathered > 0 {
+            if gathered == 0 {
+                return made;
+            }
             self.flush::<AXIS>(lattice, planes, settings, gathered, out);
+            made += gathered as u64;
         }
-        (made + gathered) as u64
     }
 
     #[inline(always)]
