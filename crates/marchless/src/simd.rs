@@ -9,11 +9,9 @@
 //! with AVX-512, 2.6 ns with SSE2):
 //! - loops that the compiler vectorises: 3.5 ns, and no faster with AVX2 switched on;
 //! - `wide`: 1.9 ns; chooses its instructions when it is compiled, not at run time;
-//! - `pulp`: 1.4 to 1.5 ns, but comparisons to bits and permutations only in the parts that are made for one level of
-//!   x86;
+//! - `pulp`: 1.4 to 1.5 ns, but comparisons to bits and permutations only in its parts for one level of x86 each;
 //! - `fearless_simd`: 1.4 to 2.9 ns; as fast as this where its `kernel!` leads to the same intrinsics, which is then
-//!   all that it would
-//!   be needed for.
+//!   all that it would be needed for.
 
 use core::mem::MaybeUninit;
 

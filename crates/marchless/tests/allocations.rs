@@ -9,8 +9,9 @@ use std::alloc::System;
 use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
 
 thread_local! {
-    /// What this thread has allocated; the test harness has threads of its own.
+    /// How often this thread has allocated, and how many bytes; the test harness has threads of its own.
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+    static BYTES: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
@@ -19,6 +20,7 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        BYTES.set(BYTES.get() + layout.size());
         // SAFETY: the caller's promises are the same.
         unsafe { System.alloc(layout) }
     }
@@ -108,4 +110,19 @@ fn warm_meshing_of_a_chunk_allocates_nothing() {
     };
     assert_ne!(allocations(&mut mesh), 0, "cold buffers must grow");
     assert_eq!(allocations(&mut mesh), 0);
+}
+
+/// Beside the samples and the mesh, a mesher keeps the signs of three slabs and what one batch of vertices is made of.
+#[test]
+fn large_volumes_need_little_scratch_memory() {
+    let shape = Shape::cube(256).expect("the size is small");
+    let weights = weights::<i8>(shape, 0.0);
+    let samples = Samples::new(shape, &weights).expect("one weight a sample");
+    let (mut mesh, settings) = (MeshBuffer::new(), MeshSettings::default());
+    Mesher::new().mesh(samples, &settings, &mut mesh).expect("there are cells to mesh");
+    assert!(mesh.triangle_count() > 100_000);
+    let before = BYTES.get();
+    Mesher::new().mesh(samples, &settings, &mut mesh).expect("there are cells to mesh");
+    let scratch = BYTES.get() - before;
+    assert!((10_000..200_000).contains(&scratch), "{scratch} bytes");
 }

@@ -1,5 +1,5 @@
-//! The example `mesh_volume`: every type of sample in every format is the mesh of the whole volume, and the surface lies between the same
-//! samples as in the file's own numbers.
+//! The example `mesh_volume`: every type of sample in every format is the mesh of the whole volume, and the surface
+//! lies between the same samples as in the file's own numbers.
 
 #[path = "mesh_volume/program.rs"]
 mod program;
@@ -77,7 +77,8 @@ fn every_type_in_every_format_is_the_mesh_of_the_whole_volume() {
     }
 }
 
-/// That a facet's normal is of unit length, at right angles to it and on the side from which its corners run counter-clockwise.
+/// That a facet's normal is of unit length, at right angles to it and on the side from which its corners run
+/// counter-clockwise.
 #[track_caller]
 fn assert_is_normal_of(normal: [f32; 3], facet: [[f32; 3]; 3]) {
     let normal = normal.map(f64::from);

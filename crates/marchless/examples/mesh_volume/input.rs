@@ -21,8 +21,8 @@ pub(crate) struct Volume {
     pub(crate) size: [u32; 3],
     /// Whether neighbours along z, rather than x, are neighbours in the file. Then a slab is one of x.
     ///
-    /// A NumPy array has the indices `[z][y][x]` whatever its order in memory, since NumPy hides that order from those who use it.
-    /// In C order, the last index is the fastest; in Fortran order the first is.
+    /// A NumPy array has the indices `[z][y][x]` whatever its order in memory, since NumPy hides that order from those
+    /// who use it. In C order, the last index is the fastest; in Fortran order the first is.
     pub(crate) z_fastest: bool,
 }
 

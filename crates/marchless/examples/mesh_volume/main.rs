@@ -5,8 +5,8 @@
 //! mesh_volume engine.raw --shape 256,256,128 --type u8 --iso 80 --spacing 1,1,1.6 -o engine.glb
 //! ```
 //!
-//! What lies below the isovalue is inside. The volume may be larger than memory: it is read, meshed and written a slab (the samples
-//! of one z) at a time.
+//! What lies below the isovalue is inside. The volume may be larger than memory: it is read, meshed and written a slab
+//! (the samples of one z) at a time.
 
 mod args;
 mod error;

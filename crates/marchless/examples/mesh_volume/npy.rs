@@ -1,8 +1,9 @@
 //! [`Header`]: what a `.npy` file says of the array that follows.
 //!
-//! The format is that of NumPy's `numpy.lib.format`, versions 1 to 3: a magic, a version, the length of the rest, and a Python
-//! dictionary of three entries. There are crates for it, but with a parser of all of Python's literals and big numbers behind them;
-//! what NumPy writes for plain numbers is little enough to be read here, with a sentence for everything else.
+//! The format is that of NumPy's `numpy.lib.format`, versions 1 to 3: a magic, a version, the length of the rest, and a
+//! Python dictionary of three entries. There are crates for it, but with a parser of all of Python's literals and big
+//! numbers behind them; what NumPy writes for plain numbers is little enough to be read here, with a sentence for
+//! everything else.
 
 use std::io::{self, Read};
 

@@ -1,7 +1,8 @@
 //! [`Output`]: a mesh file that grows piece by piece and takes its place only when it is whole.
 //!
-//! In every format a header with counts comes first, then what is written per vertex, then what is written per triangle. The counts and where
-//! the triangles begin are known last: room is left for the header, and the triangles wait in a second file (see [`Draft`]).
+//! In every format a header with counts comes first, then what is written per vertex, then what is written per
+//! triangle. The counts and where the triangles begin are known last: room is left for the header, and the triangles
+//! wait in a second file (see [`Draft`]).
 
 mod draft;
 mod glb;

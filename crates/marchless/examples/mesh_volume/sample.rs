@@ -79,12 +79,14 @@ integer_sample!(i16, i16, 0);
 integer_sample!(u8, i8, 0x80);
 integer_sample!(u16, i16, 0x8000);
 
-/// The isovalue of integer weights, in voxels, for samples from `least` to `most`, the lowest of which becomes the lowest weight.
+/// The isovalue of integer weights, in voxels, for samples from `least` to `most`, the lowest of which becomes the
+/// lowest weight.
 ///
 /// A whole number lies below an isovalue exactly where it lies below the next whole number up. So the rounding to
 /// `f32` may move the isovalue, but not onto or over a whole number.
 fn integer_isovalue<W: Weight>(iso: f64, least: f64, most: f64) -> f32 {
-    // Beyond the range nothing changes any more: no sample lies below the least one, all lie below one more than the most.
+    // Beyond the range nothing changes any more: no sample lies below the least one, all lie below one more than the
+    // most.
     let iso = iso.clamp(least, most + 1.0);
     // 0 for signed samples, half of the range for unsigned ones.
     let shift = least + (most - least + 1.0) / 2.0;

@@ -28,7 +28,8 @@ const WRITING: usize = 2;
 /// Meshes the whole volume and puts the output in its place.
 ///
 /// # Errors
-/// [`Error`] where the volume cannot be read to its end, the mesh cannot be named by 32-bit indices or written, or the user has enough of it.
+/// [`Error`] where the volume cannot be read to its end, the mesh cannot be named by 32-bit indices or written, or the
+/// user has enough of it.
 pub(crate) fn stream(
     volume: &mut Volume,
     iso: f64,

@@ -7,9 +7,8 @@
 //!
 //! Refused, with times of a padded chunk of 35³ `i16` samples (caves, AVX-512, Zen 4, 3.7 GHz; 44 µs as it is):
 //! - each vertex computed as it is found, from slices of rows: 141 µs;
-//! - gradients' differences taken while gathering, which writes eight numbers a vertex: 50 µs, and 330 instead of 260
-//!   µs on
-//!   white noise; the loop is bound by its stores;
+//! - gradients' differences taken while gathering, which writes eight numbers a vertex: 50 µs, and 330 instead of
+//!   260 µs on white noise; the loop is bound by its stores;
 //! - `f32` samples in pairs like the integers' (51 instead of 45 µs), and integers in fours like `f32`'s (59 instead of
 //!   53 µs with AVX2): compilers take these apart badly;
 //! - listing the crossings of all words, without looking for those that have any: 59 instead of 56 µs.
@@ -98,25 +97,24 @@ impl<W: Weight> Vertices<W> {
         out: &mut MeshBuffer,
     ) -> u64 {
         let mut made = 0;
-        let mut blocks = low.chunks(64).zip(high.chunks(64));
-        // Of the present block: its first word, its words' crossings, and those that are not zero and not done.
-        let (mut start, mut crossed, mut words) = (0, [0; 64], 0u64);
-        let mut next_start = 0;
+        let mut blocks = low.chunks(64).zip(high.chunks(64)).enumerate();
+        // Of the present block of words: its number, their crossings, and which are not zero and not done.
+        let (mut block, mut crossed, mut words) = (0, [0; 64], 0u64);
         loop {
             let mut gathered = 0;
             while gathered < GATHERED {
                 if words == 0 {
-                    let Some((low, high)) = blocks.next() else { break };
+                    let Some((number, (low, high))) = blocks.next() else { break };
                     for (crossed, (low, high)) in crossed.iter_mut().zip(low.iter().zip(high)) {
                         *crossed = low ^ high;
                     }
                     words = S::nonzero(filled(&mut crossed, low.len()));
-                    (start, next_start) = (next_start, next_start + 64);
+                    block = number;
                     continue;
                 }
                 let word = words.trailing_zeros() as usize;
                 words &= words - 1;
-                let (y, x) = lattice.place_of(start + word);
+                let (y, x) = lattice.place_of(64 * block + word);
                 let (xs, ys) = (self.x[gathered..].first_chunk_mut(), self.y[gathered..].first_chunk_mut());
                 let (xs, ys) = xs.zip(ys).expect("there is room for another word's");
                 gathered += S::positions(crossed[word % 64], x, y, xs, ys);
@@ -129,6 +127,7 @@ impl<W: Weight> Vertices<W> {
         }
     }
 
+    /// Makes vertices of the first `count` crossings that were gathered.
     #[inline(always)]
     fn flush<const AXIS: usize>(
         &mut self,
@@ -179,7 +178,7 @@ impl<W: Weight> Vertices<W> {
         }
     }
 
-    /// Copies what the first `count` vertices are made of. Without padding, samples beyond the border are made up.
+    /// Copies what the first `count` vertices are made of.
     #[inline(always)]
     fn gather<const AXIS: usize, const PADDED: bool>(
         &mut self,
@@ -352,7 +351,8 @@ unsafe fn four<W: Weight, const PADDED: bool>(
     index: usize,
     x: u32,
 ) -> (W::Left, W::Right) {
-    // SAFETY: padding lies before and behind each row. Without it, the row's outermost samples stand in.
+    // SAFETY: padding lies before and behind each row, and a row of it behind the last. Without padding, the row's
+    // outermost samples stand in.
     unsafe {
         if PADDED {
             debug_assert!(index >= 1 && index + 2 < slab.len());

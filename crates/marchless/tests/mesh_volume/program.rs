@@ -57,7 +57,8 @@ impl Folder {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Runs the example, which must refuse with one sentence that has all of `because` in it, and leave all files as they were.
+    /// Runs the example, which must refuse with one sentence that has all of `because` in it, and leave all files as
+    /// they were.
     #[track_caller]
     pub(crate) fn assert_refused(&self, args: &str, code: i32, because: &[&str]) {
         let before = self.names();

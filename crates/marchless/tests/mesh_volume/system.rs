@@ -73,7 +73,8 @@ mod unix {
             let (name, args) = (format!("o.{format}"), format!("v.raw {} --iso 100 -o o.{format}", volume.flags()));
             folder.mesh(&args);
             let whole = folder.read(&name);
-            // From no room at all to all but the last 512 bytes; a program that ignores the signal is told of its full file.
+            // From no room at all to all but the last 512 bytes; a program that ignores the signal is told of its full
+            // file.
             let last = (whole.len() as u64 - 1) / 512;
             for blocks in [0, 1, last / 4, last / 2, last * 3 / 4, last] {
                 folder.write(&name, b"old");

@@ -7,7 +7,7 @@ use proptest::{collection::vec, prelude::*, sample::select};
 #[derive(Clone, Debug)]
 pub(crate) struct Field<W> {
     pub(crate) shape: Shape,
-    /// In memory of just their size, so that AddressSanitizer sees a read behind the last one.
+    /// In memory of just their size, so that a sanitizer sees a read behind the last one.
     pub(crate) weights: Box<[W]>,
     pub(crate) materials: Box<[u8]>,
     pub(crate) padded: bool,

@@ -10,7 +10,8 @@ use super::{Encoder, OutputError, bytes};
 /// Must not begin with "solid", as text files do.
 const TITLE: &[u8] = b"binary STL made by mesh_volume";
 
-/// A piece is what a slab adds: triangles between it and the slab before it, which have no other vertices than the two slabs.
+/// A piece is what a slab adds: triangles between it and the slab before it, which have no other vertices than the two
+/// slabs.
 const PIECES: usize = 2;
 
 #[derive(Default)]
