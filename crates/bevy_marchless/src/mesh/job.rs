@@ -58,15 +58,18 @@ pub(super) fn mesh_with(
     mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
 ) -> Meshed {
     thread_local! {
-        static SCRATCH: RefCell<(Mesher, Block<i16>)> = RefCell::new((Mesher::new(), Block::new()));
+        static SCRATCH: RefCell<(Mesher, Block<i16>, MeshBuffer)> =
+            RefCell::new((Mesher::new(), Block::new(), MeshBuffer::new()));
     }
     let start = Instant::now();
-    let mut geometry = MeshBuffer::new();
-    let result = SCRATCH.with_borrow_mut(|(mesher, block)| mesh(mesher, block, &mut geometry));
-    if let Err(error) = result {
-        bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
-        geometry.clear();
-    }
+    // A copy takes no more memory than the mesh needs; a buffer that has grown does.
+    let geometry = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
+        Ok(()) => geometry.clone(),
+        Err(error) => {
+            bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
+            MeshBuffer::new()
+        }
+    });
     let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors));
     Meshed { position, geometry: Arc::new(geometry), mesh, time: start.elapsed() }
 }
