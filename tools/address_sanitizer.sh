@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-if ! rustup toolchain list 2>/dev/null | grep -q '^nightly'; then
+if ! rustup toolchain list 2>/dev/null | grep -q '^nightly-[a-z]'; then
     echo "skipped: AddressSanitizer needs a nightly toolchain"
     exit 0
 fi

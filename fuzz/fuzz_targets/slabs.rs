@@ -1,4 +1,4 @@
-//! Volumes that come slab by slab, wrong slabs among them: the mesh of the whole, or a typed error that changes nothing.
+//! Volumes that come slab by slab, wrong slabs among them: the mesh of the whole, or typed errors that change nothing.
 
 #![no_main]
 

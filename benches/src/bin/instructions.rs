@@ -3,7 +3,8 @@
 //!
 //! `cargo run --release -p marchless_benches --bin instructions` measures and judges; with `-- --renew` it writes
 //! `benches/instructions.txt` instead, for a change that is worth what it costs, for one that made things faster, or
-//! for another compiler. Counts of another compiler than the baseline's are shown, but not judged.
+//! for another compiler. Counts of another compiler than the baseline's are shown, but not judged; where `CI` is set in
+//! the environment, they fail, lest nobody judges any more.
 //!
 //! Four fields of 35³ and 64³ `i16` samples, padding included, with normals, on the portable and the AVX2 backend, each
 //! forced, into warm buffers. The fields are sampled before valgrind starts, since noise under valgrind takes long;
@@ -66,8 +67,17 @@ fn judge() -> Result<(), Box<dyn Error>> {
             failures.push(format!("{what} takes {change:.2} % more instructions"));
         }
     }
+    for (what, _) in &baseline.of {
+        if !counts.of.iter().any(|(other, _)| other == what) {
+            failures.push(format!("{what} was not measured"));
+        }
+    }
     if counts.compiler != baseline.compiler {
-        println!("not judged: the baseline is of {}, this is {}", baseline.compiler, counts.compiler);
+        let compilers = format!("the baseline is of {}, this is {}", baseline.compiler, counts.compiler);
+        if env::var_os("CI").is_some() {
+            return Err(format!("{compilers}; `{RENEW}` makes a new baseline").into());
+        }
+        println!("not judged: {compilers}");
         return Ok(());
     }
     if failures.is_empty() {

@@ -9,7 +9,7 @@
 //! of neighbouring words, and only the few crossings and active cells are ever looked at one by one. All passes work on
 //! one slab of samples after the other, while it is in the cache, and only the signs of three slabs are kept. (Refused:
 //! meshing a slab without having read the next one in one go, so that gradients fetch its samples here and there; caves
-//! of 256³ `f32` samples then take 67 ms instead of 41.)
+//! of 256³ `f32` samples then took 67 instead of 41 ms.)
 //!
 //! Vertices are numbered slab by slab: those on edges along z from the slab below, then those on edges along x and
 //! along y, each row by row. Triangles follow the cells, x fastest.

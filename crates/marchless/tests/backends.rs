@@ -4,10 +4,13 @@
 #[path = "support/fields.rs"]
 mod fields;
 
+#[cfg(feature = "std")]
 use std::num::NonZero;
 
 use fields::{Field, TestWeight};
-use marchless::{Backend, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher, ThreadedMesher};
+#[cfg(feature = "std")]
+use marchless::ThreadedMesher;
+use marchless::{Backend, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher};
 use proptest::prelude::*;
 
 /// A mesh down to the last bit, signs of zeros and all.
@@ -71,6 +74,7 @@ fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> 
         let mesh = meshed(Mesher::with_backend(backend), field.samples(), &settings);
         prop_assert_eq!(&mesh, &portable, "{}", backend.name());
     }
+    #[cfg(feature = "std")]
     for threads in 1..=3 {
         let mut mesh = MeshBuffer::new();
         let mut mesher = ThreadedMesher::new(NonZero::new(threads).expect("there is a thread"));
@@ -140,11 +144,11 @@ fn the_fastest_backend_is_the_last_that_is_available() {
         Backend::ALL.iter().map(|backend| backend.name()).collect::<Vec<_>>(),
         ["portable", "sse2", "avx2", "avx512"]
     );
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", feature = "std"))]
     assert_eq!(Backend::Avx2.is_available(), ["avx2", "bmi2", "lzcnt"].iter().all(|&name| processor_has(name)));
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "std"))]
 fn processor_has(name: &str) -> bool {
     match name {
         "avx2" => is_x86_feature_detected!("avx2"),
@@ -153,6 +157,7 @@ fn processor_has(name: &str) -> bool {
     }
 }
 
+#[cfg(feature = "std")]
 #[test]
 fn threads_refuse_what_one_refuses() {
     let mut mesher = ThreadedMesher::new(NonZero::new(2).expect("two are some"));

@@ -62,7 +62,7 @@ pub(crate) enum Error {
     Memory { slab: [u32; 2] },
 
     #[error(
-        "a spacing of {spacing} along an axis of {samples} samples gives positions that 32-bit numbers cannot tell apart or hold"
+        "a spacing of {spacing:?} along an axis of {samples} samples gives positions that 32-bit numbers cannot tell apart or hold"
     )]
     Spacing { spacing: f64, samples: u32 },
 

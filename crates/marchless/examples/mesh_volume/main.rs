@@ -83,7 +83,7 @@ fn summarise(args: &Args, volume: &Volume, totals: &Totals) {
     if totals.triangles == 0 {
         let _ = writeln!(
             io::stderr(),
-            "note: there is no surface, since no neighbouring samples lie on different sides of {}",
+            "note: there is no surface, since no neighbouring samples lie on different sides of {:?}",
             args.iso
         );
     }

@@ -44,9 +44,11 @@ impl Output {
             "glb" => Box::new(glb::Glb::default()),
             _ => return Err(Error::OutputFormat { path: path.to_owned() }),
         };
-        let draft = Draft::create(path, encoder.header_length())
-            .map_err(|source| Error::Write { path: path.to_owned(), source: source.into() })?;
-        Ok(Self { path: path.to_owned(), draft, encoder })
+        // A link stays one: what it leads to is replaced.
+        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let draft = Draft::create(&path, encoder.header_length())
+            .map_err(|source| Error::Write { path: path.clone(), source: source.into() })?;
+        Ok(Self { path, draft, encoder })
     }
 
     /// Adds a piece of the mesh, whose indices count all vertices since the first piece.

@@ -23,8 +23,7 @@ const PARTS: usize = 8;
 ///
 /// The mesh is that of [`Mesher::mesh`](super::Mesher::mesh), byte for byte, on any number of threads; the same promises
 /// hold. The threads make parts of the mesh in memory of their own, which takes as much again as the mesh, and join
-/// them; volumes beyond the caches wait for memory rather than for threads. For many small volumes, such as chunks,
-/// give each thread a `Mesher` of its own instead.
+/// them. For many small volumes, such as chunks, give each thread a `Mesher` of its own instead.
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshSettings, Samples, Shape, ThreadedMesher};

@@ -5,7 +5,8 @@
 //! The second is a plain loop, written so that the compiler makes vector instructions of it (arrays of fixed length, no
 //! closures, conditions as selections).
 //!
-//! Refused, with times of a padded chunk of 35³ `i16` samples (caves, AVX-512, Zen 4, 3.7 GHz; 44 µs as it is):
+//! Refused, with times of a padded chunk of 35³ `i16` samples (caves, AVX-512, Zen 4, 3.7 GHz; 42 µs as it is), each
+//! beside what stood then:
 //! - each vertex computed as it is found, from slices of rows: 141 µs;
 //! - gradients' differences taken while gathering, which writes eight numbers a vertex: 50 µs, and 330 instead of
 //!   260 µs on white noise; the loop is bound by its stores;
