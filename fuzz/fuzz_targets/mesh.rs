@@ -34,7 +34,7 @@ fn check<W: FuzzWeight>(volume: &Volume<W>, threads: u8) {
     for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
         // A mesher that has seen something else must not remember it.
         let mut mesher = Mesher::with_backend(backend);
-        let turned_over = MeshSettings { isovalue: -settings.isovalue, normals: !settings.normals };
+        let turned_over = MeshSettings { isovalue: -settings.isovalue, normals: !settings.normals, ..*settings };
         let _ = mesher.mesh(samples, &turned_over, &mut mesh);
         let _ = mesher.mesh(samples, settings, &mut mesh);
         assert_eq!(Bits::of(&mesh), plain, "{}", backend.name());

@@ -57,7 +57,7 @@ impl<'a, W: FuzzWeight> Arbitrary<'a> for Volume<W> {
             2 => f32::from(iso_bits as i8) / 16.0,
             _ => f32::from_bits(iso_bits),
         };
-        Ok(Self { shape, weights, materials, padded, settings: MeshSettings { isovalue, normals } })
+        Ok(Self { shape, weights, materials, padded, settings: MeshSettings { isovalue, normals, ..MeshSettings::default() } })
     }
 }
 

@@ -166,7 +166,7 @@ impl Terrain {
     }
 
     pub(crate) fn mesh_settings(&self) -> MeshSettings {
-        MeshSettings { isovalue: self.isovalue, normals: self.normals }
+        MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() }
     }
 }
 

@@ -52,6 +52,18 @@ pub struct MeshSettings {
     pub isovalue: f32,
     /// Whether to compute normals; default true.
     pub normals: bool,
+    /// Which way the surface goes where the signs of a cell's corners leave it open; default [`Topology::Separated`].
+    pub topology: Topology,
+}
+
+/// Which way the surface goes where the signs of a cell's corners leave it open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Topology {
+    /// Inside corners that stand diagonally on a face are separated; the rule of the cases ([`cases`](crate::cases)).
+    #[default]
+    Separated,
+    /// As the trilinear interpolant of the cell's corners has it.
+    Trilinear,
 }
 
 impl MeshSettings {
@@ -62,7 +74,7 @@ impl MeshSettings {
 
 impl Default for MeshSettings {
     fn default() -> Self {
-        Self { isovalue: 0.0, normals: true }
+        Self { isovalue: 0.0, normals: true, topology: Topology::Separated }
     }
 }
 

@@ -60,7 +60,7 @@ fn mesh_all<W: Weight>(fields: &[(Shape, Vec<W>, Vec<u8>)], mesher: &mut Mesher,
         for samples in [plain, plain.padded(), with_materials, with_materials.padded()] {
             for normals in [true, false] {
                 mesher
-                    .mesh(samples, &MeshSettings { isovalue: 0.25, normals }, out)
+                    .mesh(samples, &MeshSettings { isovalue: 0.25, normals, ..MeshSettings::default() }, out)
                     .expect("the shapes are large enough");
                 assert!(!out.is_empty());
             }

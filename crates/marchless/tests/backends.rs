@@ -68,7 +68,7 @@ fn streamed<W: TestWeight>(samples: Samples<'_, W>, settings: &MeshSettings, tak
 }
 
 fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> Result<(), TestCaseError> {
-    let settings = MeshSettings { isovalue: field.isovalue, normals };
+    let settings = MeshSettings { isovalue: field.isovalue, normals, ..MeshSettings::default() };
     let portable = meshed(Mesher::with_backend(Backend::Portable), field.samples(), &settings);
     for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
         let mesh = meshed(Mesher::with_backend(backend), field.samples(), &settings);
@@ -79,7 +79,7 @@ fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> 
         let mut mesh = MeshBuffer::new();
         let mut mesher = ThreadedMesher::new(NonZero::new(threads).expect("there is a thread"));
         // A mesher and a buffer that have seen other samples must not remember them.
-        let turned_over = MeshSettings { isovalue: -field.isovalue, normals: true };
+        let turned_over = MeshSettings { isovalue: -field.isovalue, ..settings };
         mesher.mesh(Samples::new(field.shape, &field.weights)?, &turned_over, &mut mesh)?;
         mesher.mesh(field.samples(), &settings, &mut mesh)?;
         prop_assert_eq!(&bits(&mesh), &portable, "{} threads", threads);
@@ -164,7 +164,7 @@ fn threads_refuse_what_one_refuses() {
     let mut mesh = MeshBuffer { positions: vec![[0.0; 3]], ..MeshBuffer::new() };
     let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
     let samples = Samples::new(Shape::cube(2).expect("the size is small"), &weights).expect("one weight a sample");
-    let refused = mesher.mesh(samples, &MeshSettings { isovalue: f32::NAN, normals: true }, &mut mesh);
+    let refused = mesher.mesh(samples, &MeshSettings { isovalue: f32::NAN, ..MeshSettings::default() }, &mut mesh);
     assert!(matches!(refused, Err(MeshError::Isovalue { found }) if found.is_nan()) && mesh.positions.is_empty());
     let refused = mesher.mesh(samples.padded(), &MeshSettings::default(), &mut mesh);
     assert_eq!(refused, Err(MeshError::TooSmall { shape: samples.shape(), least: 4 }));

@@ -29,7 +29,7 @@ fn whole(volume: &Volume, iso: f64) -> Mesh {
     fn mesh<W: Weight>(volume: &Volume, isovalue: f64, weight: impl Fn(f64) -> W) -> Mesh {
         let shape = Shape::new(volume.size.map(|n| n as u32)).expect("a small shape");
         let weights: Vec<W> = volume.samples.iter().map(|&sample| weight(sample)).collect();
-        let settings = MeshSettings { isovalue: isovalue as f32 / W::SCALE, normals: true };
+        let settings = MeshSettings { isovalue: isovalue as f32 / W::SCALE, ..MeshSettings::default() };
         let mut out = MeshBuffer::new();
         let samples = Samples::new(shape, &weights).expect("one weight a sample");
         Mesher::new().mesh(samples, &settings, &mut out).expect("it can be meshed");

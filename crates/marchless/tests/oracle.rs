@@ -106,9 +106,9 @@ fn compare<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
     let mut mesh = MeshBuffer::new();
     // A mesher and a buffer that have seen other samples must not remember them.
     let mut mesher = Mesher::new();
-    let turned_over = MeshSettings { isovalue: -field.isovalue, normals: false };
+    let turned_over = MeshSettings { isovalue: -field.isovalue, normals: false, ..MeshSettings::default() };
     mesher.mesh(field.samples(), &turned_over, &mut mesh)?;
-    mesher.mesh(field.samples(), &MeshSettings { isovalue: field.isovalue, normals: true }, &mut mesh)?;
+    mesher.mesh(field.samples(), &MeshSettings { isovalue: field.isovalue, ..MeshSettings::default() }, &mut mesh)?;
 
     prop_assert_eq!(mesh.positions.len(), vertices.len());
     prop_assert_eq!((mesh.normals.len(), mesh.materials.len()), (vertices.len(), vertices.len()));

@@ -133,7 +133,7 @@ fn check_seams<W: Random>(
     isovalue: f32,
 ) -> Result<(), TestCaseError> {
     let grid = grid::<W>(field, seed, cells, bounds);
-    let settings = MeshSettings { isovalue, normals: true };
+    let settings = MeshSettings { isovalue, ..MeshSettings::default() };
     let meshes = meshes(&grid, &settings);
 
     for (&position, mesh) in &meshes {

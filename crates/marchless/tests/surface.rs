@@ -12,7 +12,7 @@ use proptest::prelude::*;
 
 fn mesh<W: Weight>(samples: Samples<'_, W>, isovalue: f32) -> MeshBuffer {
     let mut mesh = MeshBuffer::new();
-    let settings = MeshSettings { isovalue, normals: true };
+    let settings = MeshSettings { isovalue, ..MeshSettings::default() };
     Mesher::new().mesh(samples, &settings, &mut mesh).expect("the samples can be meshed");
     mesh
 }
@@ -226,7 +226,7 @@ fn a_reused_buffer_holds_only_what_was_asked_for() {
     let with_materials = samples.with_materials(&materials).expect("one material a sample");
     let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
     let mut lengths = |samples, normals| {
-        mesher.mesh(samples, &MeshSettings { normals, isovalue: 0.0 }, &mut mesh).expect("a ball");
+        mesher.mesh(samples, &MeshSettings { normals, ..MeshSettings::default() }, &mut mesh).expect("a ball");
         [mesh.positions.len(), mesh.normals.len(), mesh.materials.len()]
     };
     let [count, ..] = lengths(with_materials, true);

@@ -111,7 +111,7 @@ impl ChunkSamples {
     /// The job that meshes the samples as they are now.
     fn mesh_job(&self, wants_asset: bool) -> impl FnOnce() -> Meshed + Send + 'static {
         let data = self.data.clone();
-        let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals };
+        let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
         let colors = wants_asset.then(|| Arc::new(self.palette.to_vertex_colors()));
         move || {
             let zeros;

@@ -92,7 +92,8 @@ pub fn geometry(app: &mut App, terrain: Entity) -> Vec<(IVec3, Arc<MeshBuffer>)>
 pub fn expected_geometry(app: &App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)> {
     let volume = volume(app, terrain);
     let settings = volume.settings().expect("good settings");
-    let settings = marchless::MeshSettings { isovalue: settings.isovalue, normals: settings.normals };
+    let settings =
+        marchless::MeshSettings { isovalue: settings.isovalue, normals: settings.normals, ..Default::default() };
     let mut mesher = marchless::Mesher::new();
     volume
         .grid()

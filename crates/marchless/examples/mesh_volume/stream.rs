@@ -58,7 +58,7 @@ fn stream_as<S: Sample>(
 ) -> Result<Totals, Error> {
     let slab = volume.slab();
     let (mut bytes, mut weights) = buffers::<S>(slab, volume.sample_type)?;
-    let settings = MeshSettings { isovalue: S::isovalue(iso), normals: true };
+    let settings = MeshSettings { isovalue: S::isovalue(iso), ..MeshSettings::default() };
     let mut mesher = SlabMesher::new(slab, settings).map_err(|source| volume.error(source))?;
     let mut mesh = MeshBuffer::new();
     let mut sink = Sink { transform, output, stop, totals: Totals::default(), since: Instant::now() };
