@@ -77,7 +77,8 @@ fn replay(stamps_an_update: usize) -> Option<Summary> {
     let mut chunks = app.world_mut().query::<&ChunkGeometry>();
     let meshes: Vec<_> = chunks.iter(app.world()).map(|geometry| &geometry.mesh).collect();
     let reports = meshes.iter().map(|mesh| MeshReport::new(&mesh.positions, &mesh.indices));
-    let sound = reports.filter(|report| report.non_manifold_edges == 0 && report.degenerate_triangles == 0).count();
+    let defects = |report: &MeshReport| report.non_manifold_edges + report.zero_area_triangles;
+    let sound = reports.filter(|report| defects(report) == 0).count();
     let triangles: usize = meshes.iter().map(|mesh| mesh.indices.len() / 3).sum();
     Some(Summary { hash, chunks: meshes.len(), sound, triangles })
 }

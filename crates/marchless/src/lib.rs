@@ -90,4 +90,4 @@ pub use query::{RayHit, ray_cast, weight_at};
 pub use sample::{Voxel, Weight};
 pub use simd::Backend;
 pub use source::{Bound, Source, SourceRegion};
-pub use validate::MeshReport;
+pub use validate::{ExtractionReport, MeshReport};

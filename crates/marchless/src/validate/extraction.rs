@@ -1,0 +1,240 @@
+//! [`ExtractionReport`]: whether a mesh has its vertices where its samples' crossings are.
+
+use alloc::vec;
+use core::fmt;
+
+use crate::{
+    buffer::MeshBuffer,
+    lattice::Samples,
+    mesher::{MeshSettings, Topology},
+    sample::Weight,
+};
+
+/// Crossings stay this far from the ends of their edge, in cells.
+const MARGIN: f64 = 1.0 / 1024.0;
+
+/// Whether the vertices of a mesh lie where the samples that it was made from have their crossings.
+///
+/// A crossing is an edge of the lattice with one end inside and the other one outside; its vertex lies where the weight,
+/// linear along the edge, is the isovalue, but at least 1/1024 of the edge from both ends. Nothing else of the mesh is
+/// looked at: [`MeshReport`](crate::MeshReport) does that.
+///
+/// ```
+/// use marchless::{ExtractionReport, MeshBuffer, MeshSettings, Mesher, Samples, Shape};
+///
+/// let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 3.0];
+/// let (samples, settings) = (Samples::new(Shape::cube(2)?, &weights)?, MeshSettings::default());
+/// let mut mesh = MeshBuffer::new();
+/// Mesher::new().mesh(samples, &settings, &mut mesh)?;
+/// let report = ExtractionReport::new(samples, &settings, &mesh);
+/// assert!(report.is_sound());
+/// assert_eq!(report.to_string(), "sound: 3 crossings, 3 vertices");
+///
+/// mesh.positions[0][0] = 0.25;
+/// let report = ExtractionReport::new(samples, &settings, &mesh);
+/// assert_eq!(report.to_string(), "not sound: 3 crossings, 3 vertices, 1 of them off its crossing");
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ExtractionReport {
+    /// All vertices of the mesh.
+    pub vertices: usize,
+    /// The crossings of the samples: lattice edges with one end inside and the other one outside. Samples that cannot be
+    /// meshed have none.
+    pub crossings: usize,
+    /// Vertices that are not where they should be: on no lattice edge, on one that is no crossing, or elsewhere on it
+    /// than its crossing is.
+    pub off_crossing: usize,
+    /// Vertices on a crossing that has another one before them.
+    pub repeated: usize,
+    /// Crossings without a vertex on their edge.
+    pub missing: usize,
+    /// Vertices strictly inside a cell that has corners both inside and outside. Only
+    /// [`Topology::Trilinear`] has them; with another one they are [`off_crossing`](Self::off_crossing).
+    pub interior_vertices: usize,
+}
+
+impl ExtractionReport {
+    /// Compares a mesh with the samples that it was made from.
+    ///
+    /// `mesh`: positions in cells from the first meshed sample, any number of them, anywhere. They are compared with the
+    /// true crossings, computed in `f64`, to within what `f32` positions can say: 10⁻⁶ of a cell and 2⁻²³ of the position.
+    pub fn new<W: Weight>(samples: Samples<'_, W>, settings: &MeshSettings, mesh: &MeshBuffer) -> Self {
+        let lattice = Lattice::of(samples, settings.isovalue);
+        let mut report = Self { vertices: mesh.positions.len(), ..Self::default() };
+        // A bit for each edge: those along x, y and z from each meshed sample.
+        let mut seen = vec![0u64; (3 * lattice.len()).div_ceil(64)];
+        let mut crossings_seen = 0;
+        for &position in &mesh.positions {
+            match lattice.place_of(position) {
+                Place::Edge { low, axis } if lattice.is_crossing(low, axis) => {
+                    let edge = 3 * lattice.index(low) + axis;
+                    let (word, bit) = (&mut seen[edge / 64], 1 << (edge % 64));
+                    let repeated = *word & bit != 0;
+                    *word |= bit;
+                    crossings_seen += usize::from(!repeated);
+                    report.repeated += usize::from(repeated);
+                    report.off_crossing += usize::from(!repeated && !lattice.is_at_crossing(low, axis, position));
+                }
+                Place::Cell(low) if settings.topology == Topology::Trilinear && lattice.is_active(low) => {
+                    report.interior_vertices += 1;
+                }
+                _ => report.off_crossing += 1,
+            }
+        }
+        report.crossings = lattice.count_crossings();
+        report.missing = report.crossings - crossings_seen;
+        report
+    }
+
+    /// Whether each crossing has one vertex, where it should be, and there are no others but interior ones.
+    pub const fn is_sound(&self) -> bool {
+        self.off_crossing == 0 && self.repeated == 0 && self.missing == 0
+    }
+}
+
+impl fmt::Display for ExtractionReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |count: usize, one, several| if count == 1 { one } else { several };
+        f.write_str(if self.is_sound() { "sound: " } else { "not sound: " })?;
+        write!(f, "{} {}, ", self.crossings, plural(self.crossings, "crossing", "crossings"))?;
+        write!(f, "{} {}", self.vertices, plural(self.vertices, "vertex", "vertices"))?;
+        if self.off_crossing > 0 {
+            let word = plural(self.off_crossing, "its crossing", "their crossings");
+            write!(f, ", {} of them off {word}", self.off_crossing)?;
+        }
+        if self.repeated > 0 {
+            let word = plural(self.repeated, "a crossing that has another one", "crossings that have another one");
+            write!(f, ", {} of them on {word}", self.repeated)?;
+        }
+        if self.missing > 0 {
+            let word = plural(self.missing, "crossing", "crossings");
+            write!(f, ", {} {word} without a vertex", self.missing)?;
+        }
+        if self.interior_vertices > 0 {
+            write!(f, ", {} of them inside a cell", self.interior_vertices)?;
+        }
+        Ok(())
+    }
+}
+
+/// Where a position lies in the lattice.
+enum Place {
+    /// Between two neighbouring samples.
+    Edge { low: [usize; 3], axis: usize },
+    /// Strictly inside the cell above a sample.
+    Cell([usize; 3]),
+    /// Anywhere else.
+    Elsewhere,
+}
+
+/// The meshed samples.
+struct Lattice<'a, W> {
+    samples: Samples<'a, W>,
+    isovalue: f32,
+    /// Meshed samples per axis; less than two on one of them where there is nothing to mesh.
+    size: [usize; 3],
+}
+
+impl<'a, W: Weight> Lattice<'a, W> {
+    fn of(samples: Samples<'a, W>, isovalue: f32) -> Self {
+        let padding = 2 * usize::from(samples.is_padded());
+        let size = samples.shape().size().map(|size| (size as usize).saturating_sub(padding));
+        let meshable = isovalue.is_finite() && size.iter().all(|&size| size >= 2);
+        Self { samples, isovalue, size: if meshable { size } else { [0; 3] } }
+    }
+
+    fn len(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// A meshed sample's number among the meshed samples.
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        x + self.size[0] * (y + self.size[1] * z)
+    }
+
+    /// In voxels.
+    fn weight(&self, at: [usize; 3]) -> f32 {
+        let strides = self.samples.shape().strides();
+        let padding = usize::from(self.samples.is_padded());
+        let index: usize = (0..3).map(|axis| (at[axis] + padding) * strides[axis]).sum();
+        self.samples.weights()[index].to_voxels()
+    }
+
+    fn is_inside(&self, at: [usize; 3]) -> bool {
+        self.weight(at) < self.isovalue
+    }
+
+    /// The place of a position; beyond the lattice it is nowhere.
+    fn place_of(&self, position: [f32; 3]) -> Place {
+        let within = (0..3).all(|axis| position[axis] >= 0.0 && f64::from(position[axis]) < self.size[axis] as f64);
+        if !within {
+            return Place::Elsewhere;
+        }
+        let low = position.map(|coordinate| coordinate as usize);
+        let between = [0, 1, 2].map(|axis| low[axis] as f32 != position[axis]);
+        // There is nothing above the last sample.
+        if (0..3).any(|axis| between[axis] && low[axis] + 1 == self.size[axis]) {
+            return Place::Elsewhere;
+        }
+        match between {
+            [true, true, true] => Place::Cell(low),
+            [true, false, false] => Place::Edge { low, axis: 0 },
+            [false, true, false] => Place::Edge { low, axis: 1 },
+            [false, false, true] => Place::Edge { low, axis: 2 },
+            _ => Place::Elsewhere,
+        }
+    }
+
+    fn is_crossing(&self, low: [usize; 3], axis: usize) -> bool {
+        self.is_inside(low) != self.is_inside(stepped(low, axis))
+    }
+
+    /// Whether a position on a crossing is where it should be.
+    fn is_at_crossing(&self, low: [usize; 3], axis: usize, position: [f32; 3]) -> bool {
+        let [a, b] = [low, stepped(low, axis)].map(|end| finite(self.weight(end)));
+        let crossing = (f64::from(self.isovalue) - a) / (b - a);
+        // Both ends are the same where they are at, and beyond, a limit of `f32`.
+        let crossing = if crossing.is_nan() { 0.0 } else { crossing }.clamp(MARGIN, 1.0 - MARGIN);
+        let coordinate = f64::from(position[axis]);
+        let fraction = coordinate - low[axis] as f64;
+        // Beyond 16,384 cells `f32` has no number within the margin.
+        let clamped = (MARGIN..=1.0 - MARGIN).contains(&fraction) || coordinate >= 16_384.0;
+        clamped && (fraction - crossing).abs() <= 1e-6 + coordinate * f64::from(f32::EPSILON)
+    }
+
+    /// Whether the cell above a sample has corners inside and outside.
+    fn is_active(&self, low: [usize; 3]) -> bool {
+        let mut corners = (0..8usize).map(|corner| [0, 1, 2].map(|axis| low[axis] + (corner >> axis & 1)));
+        let first = self.is_inside(low);
+        corners.any(|corner| self.is_inside(corner) != first)
+    }
+
+    fn count_crossings(&self) -> usize {
+        let [nx, ny, nz] = self.size;
+        let mut count = 0;
+        for z in 0..nz {
+            for y in 0..ny {
+                for x in 0..nx {
+                    let at = [x, y, z];
+                    for axis in 0..3 {
+                        count += usize::from(at[axis] + 1 < self.size[axis] && self.is_crossing(at, axis));
+                    }
+                }
+            }
+        }
+        count
+    }
+}
+
+/// The next sample along an axis.
+fn stepped(mut at: [usize; 3], axis: usize) -> [usize; 3] {
+    at[axis] += 1;
+    at
+}
+
+/// NaN is outside, and nothing lies beyond what `f32` can say.
+fn finite(weight: f32) -> f64 {
+    f64::from(if weight.is_nan() { f32::MAX } else { weight.clamp(f32::MIN, f32::MAX) })
+}

@@ -1,0 +1,202 @@
+//! [`Links`]: edges, fans, rims and components, told from what surrounds each vertex.
+//!
+//! A vertex's link is what its triangles have opposite to it: a segment each, from the corner after the vertex to the
+//! one before it. The links of all vertices are gathered in one array, by counting. An edge is then a vertex and an end
+//! of a segment in its link; and the link of a vertex inside a sound surface is a ring, seen to be one in a few
+//! comparisons. Only what is no ring is sorted.
+
+use alloc::{vec, vec::Vec};
+
+/// What the indices say of a surface.
+#[derive(Default)]
+pub(super) struct Links {
+    /// The edges of one triangle only, as it runs along them.
+    pub(super) boundary: Vec<[u32; 2]>,
+    pub(super) edges: usize,
+    pub(super) non_manifold_edges: usize,
+    pub(super) non_manifold_vertices: usize,
+    pub(super) inconsistent_edges: usize,
+    pub(super) duplicate_triangles: usize,
+    pub(super) used_vertices: usize,
+    pub(super) components: usize,
+}
+
+/// The two other corners of a vertex's triangle, the next one first.
+type Segment = [u32; 2];
+
+impl Links {
+    /// `triangles`: three different ones of `vertices` vertices each.
+    pub(super) fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
+        let mut links = Self::default();
+        let mut scratch = Scratch::default();
+        let (mut segments, ends) = gathered(triangles, vertices);
+        let mut start = 0;
+        for (vertex, end) in ends.into_iter().enumerate() {
+            let link = &mut segments[start..end];
+            start = end;
+            if link.is_empty() {
+                continue;
+            }
+            links.used_vertices += 1;
+            if is_ring(link) {
+                links.edges += link.iter().filter(|segment| segment[0] as usize > vertex).count();
+            } else {
+                links.add(vertex as u32, link, &mut scratch);
+            }
+        }
+        links.components = links.used_vertices - joins(triangles, vertices);
+        links
+    }
+
+    /// How many handles there are, where that makes sense: 2·components − 2·genus − rims is the Euler characteristic.
+    pub(super) fn genus(&self, euler: i64) -> Option<u64> {
+        if self.non_manifold_edges + self.non_manifold_vertices + self.inconsistent_edges > 0 {
+            return None;
+        }
+        let twice = 2 * self.components as i64 - self.rims() as i64 - euler;
+        (twice % 2 == 0).then(|| u64::try_from(twice / 2).ok()).flatten()
+    }
+
+    /// The closed lines that the boundary edges of a consistently oriented manifold make.
+    fn rims(&self) -> usize {
+        let mut edges = self.boundary.clone();
+        edges.sort_unstable();
+        let mut seen = vec![false; edges.len()];
+        let mut rims = 0;
+        for first in 0..edges.len() {
+            let mut at = first;
+            rims += usize::from(!seen[first]);
+            while !seen[at] {
+                seen[at] = true;
+                let next = edges.binary_search_by_key(&edges[at][1], |edge| edge[0]);
+                at = next.unwrap_or(at);
+            }
+        }
+        rims
+    }
+
+    /// Adds what the link of `vertex` shows, whatever it looks like.
+    fn add(&mut self, vertex: u32, link: &[Segment], scratch: &mut Scratch) {
+        let Scratch { ends, fans, triangles } = scratch;
+        ends.clear();
+        for (segment, &[next, previous]) in link.iter().enumerate() {
+            ends.push(End { neighbour: next, segment, leaves: true });
+            ends.push(End { neighbour: previous, segment, leaves: false });
+        }
+        ends.sort_unstable_by_key(|end| end.neighbour);
+        fans.clear();
+        fans.extend(0..link.len());
+        let (mut fan_count, mut crowded) = (link.len(), false);
+        for edge in ends.chunk_by(|a, b| a.neighbour == b.neighbour) {
+            for pair in edge.windows(2) {
+                fan_count -= usize::from(join(fans, pair[0].segment, pair[1].segment));
+            }
+            crowded |= edge.len() > 2;
+            let neighbour = edge[0].neighbour;
+            if neighbour < vertex {
+                continue;
+            }
+            self.edges += 1;
+            self.non_manifold_edges += usize::from(edge.len() > 2);
+            let leaving = edge.iter().filter(|end| end.leaves).count();
+            self.inconsistent_edges += usize::from(leaving.abs_diff(edge.len() - leaving) > 1);
+            if edge.len() == 1 {
+                self.boundary.push(if leaving == 1 { [vertex, neighbour] } else { [neighbour, vertex] });
+            }
+        }
+        self.non_manifold_vertices += usize::from(crowded || fan_count > 1);
+
+        // A triangle is looked at where its lowest vertex is.
+        triangles.clear();
+        triangles.extend(link.iter().map(|&[a, b]| [a.min(b), a.max(b)]).filter(|&[low, _]| low > vertex));
+        triangles.sort_unstable();
+        self.duplicate_triangles += triangles.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    }
+}
+
+/// Memory that [`Links::add`] uses again and again.
+#[derive(Default)]
+struct Scratch {
+    ends: Vec<End>,
+    /// Disjoint sets of the segments that belong to one fan.
+    fans: Vec<usize>,
+    triangles: Vec<Segment>,
+}
+
+/// An end of a segment: an edge from the vertex to a neighbour, as one triangle has it.
+struct End {
+    neighbour: u32,
+    segment: usize,
+    /// Whether the triangle runs from the vertex to the neighbour.
+    leaves: bool,
+}
+
+/// The links of all vertices, one after the other, and where each ends.
+fn gathered(triangles: &[[u32; 3]], vertices: usize) -> (Vec<Segment>, Vec<usize>) {
+    let mut ends = vec![0usize; vertices];
+    for &corner in triangles.as_flattened() {
+        ends[corner as usize] += 1;
+    }
+    let mut sum = 0;
+    for end in &mut ends {
+        // For now, where each starts.
+        (*end, sum) = (sum, sum + *end);
+    }
+    let mut segments = vec![[0; 2]; sum];
+    for &[a, b, c] in triangles {
+        for (corner, segment) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
+            let end = &mut ends[corner as usize];
+            segments[*end] = segment;
+            *end += 1;
+        }
+    }
+    (segments, ends)
+}
+
+/// Whether a link is one ring of three or more segments, each of which ends where the next one starts. Puts them into
+/// that order as far as it can. Long links are not looked at.
+fn is_ring(link: &mut [Segment]) -> bool {
+    if !(3..=16).contains(&link.len()) {
+        return false;
+    }
+    let start = link[0][0];
+    let mut end = link[0][1];
+    for place in 1..link.len() {
+        // A ring that closes too early is only a part of the link.
+        let Some(next) = link[place..].iter().position(|segment| segment[0] == end && end != start) else {
+            return false;
+        };
+        link.swap(place, place + next);
+        end = link[place][1];
+    }
+    end == start
+}
+
+/// How many times two sets become one where all the vertices of each triangle are joined.
+fn joins(triangles: &[[u32; 3]], vertices: usize) -> usize {
+    let mut sets: Vec<usize> = (0..vertices).collect();
+    let mut joined = 0;
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|vertex| vertex as usize);
+        joined += usize::from(join(&mut sets, a, b)) + usize::from(join(&mut sets, b, c));
+    }
+    joined
+}
+
+/// Makes one set of those of `a` and `b`, and says whether they were two. `sets`: what is above each item in its set's
+/// tree; itself where it is the top. The higher number always goes below the lower one: with the halving of paths that
+/// is O(log n).
+fn join(sets: &mut [usize], a: usize, b: usize) -> bool {
+    let (a, b) = (top(sets, a), top(sets, b));
+    sets[a.max(b)] = a.min(b);
+    a != b
+}
+
+/// The item at the top of the tree that `item` is in.
+fn top(sets: &mut [usize], mut item: usize) -> usize {
+    while sets[item] != item {
+        sets[item] = sets[sets[item]];
+        item = sets[item];
+    }
+    item
+}

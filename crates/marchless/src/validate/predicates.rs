@@ -1,0 +1,99 @@
+//! Exact answers about triangles in space: do they have an area, do they cross.
+//!
+//! All signs come from the crate `robust`, after Jonathan Richard Shewchuk, "Adaptive Precision Floating-Point
+//! Arithmetic and Fast Robust Geometric Predicates" (1997). They are exact as long as nothing overflows or underflows:
+//! with coordinates that were `f32`, differences are at most 2¹²⁹ and multiples of 2⁻¹⁴⁹, their products of three at
+//! most 2³⁹⁰ and multiples of 2⁻⁴⁴⁷, all of which `f64` can say.
+
+use robust::{Coord, Coord3D, orient2d, orient3d};
+
+/// A triangle's corners; finite.
+pub(super) type Corners = [[f32; 3]; 3];
+
+/// Whether the corners lie on one line, or in one place.
+pub(super) fn has_no_area(corners: &Corners) -> bool {
+    (0..3).all(|axis| turn(axis, *corners) == 0.0)
+}
+
+/// Whether two triangles have a point in common that is neither a common vertex nor on a common edge. `common`: how
+/// many of the first corners of both are the same, in the same order; all others are in different places.
+///
+/// Both have an area.
+pub(super) fn cross(a: &Corners, b: &Corners, common: usize) -> bool {
+    match common {
+        0 => !apart(a, b, 0) && (0..3).any(|i| meets(a, [b[i], b[(i + 1) % 3]]) || meets(b, [a[i], a[(i + 1) % 3]])),
+        // A line from the common vertex to another common point can be followed to the side opposite the vertex, in
+        // one triangle while still within the other.
+        1 => !apart(a, b, 1) && (meets(a, [b[1], b[2]]) || meets(b, [a[1], a[2]])),
+        // In one plane, and on one side of the common edge.
+        2 => {
+            let axis = flat_axis(a);
+            side(a, b[2]) == 0.0 && (turn(axis, *a) > 0.0) == (turn(axis, *b) > 0.0)
+        }
+        _ => true,
+    }
+}
+
+/// Whether all corners of one triangle but the first `common` are on one side of the other's plane. Then they have no
+/// other point in common than those corners.
+fn apart(a: &Corners, b: &Corners, common: usize) -> bool {
+    let on_one_side = |a: &Corners, b: &Corners| {
+        let first = side(a, b[common]);
+        first != 0.0 && b[common + 1..].iter().all(|&corner| side(a, corner) * first.signum() > 0.0)
+    };
+    on_one_side(a, b) || on_one_side(b, a)
+}
+
+/// Whether a triangle and a line segment have a point in common.
+fn meets(triangle: &Corners, [p, q]: [[f32; 3]; 2]) -> bool {
+    let &[a, b, c] = triangle;
+    let (p_side, q_side) = (side(triangle, p), side(triangle, q));
+    if p_side == 0.0 && q_side == 0.0 {
+        return meets_in_plane(flat_axis(triangle), triangle, [p, q]);
+    }
+    if (p_side > 0.0 && q_side > 0.0) || (p_side < 0.0 && q_side < 0.0) {
+        return false;
+    }
+    // The line goes through the plane in one point, and passes the three sides on the same hand where that is within.
+    let hands = [[a, b], [b, c], [c, a]].map(|[start, end]| side(&[p, q, start], end));
+    hands.iter().all(|&hand| hand >= 0.0) || hands.iter().all(|&hand| hand <= 0.0)
+}
+
+/// The same, where the segment lies in the triangle's plane; seen along an axis along which the plane is not seen
+/// edge-on.
+fn meets_in_plane(axis: usize, &[a, b, c]: &Corners, [p, q]: [[f32; 3]; 2]) -> bool {
+    let sides = [[a, b], [b, c], [c, a]];
+    let turns = sides.map(|[start, end]| turn(axis, [start, end, p]));
+    let p_within = turns.iter().all(|&turn| turn >= 0.0) || turns.iter().all(|&turn| turn <= 0.0);
+    p_within || sides.iter().any(|&side| segments_meet(axis, [p, q], side))
+}
+
+/// Whether two segments of some length have a point in common, seen along an axis.
+fn segments_meet(axis: usize, [p, q]: [[f32; 3]; 2], [a, b]: [[f32; 3]; 2]) -> bool {
+    let from_pq = [turn(axis, [p, q, a]), turn(axis, [p, q, b])];
+    let from_ab = [turn(axis, [a, b, p]), turn(axis, [a, b, q])];
+    let same = |[first, second]: [f64; 2]| (first > 0.0 && second > 0.0) || (first < 0.0 && second < 0.0);
+    if same(from_pq) || same(from_ab) {
+        return false;
+    }
+    // On one line, they meet where their boxes do.
+    from_pq != [0.0; 2]
+        || (0..3).all(|k| k == axis || (p[k].min(q[k]) <= a[k].max(b[k]) && a[k].min(b[k]) <= p[k].max(q[k])))
+}
+
+/// An axis along which a triangle is not seen edge-on.
+fn flat_axis(corners: &Corners) -> usize {
+    (0..2).find(|&axis| turn(axis, *corners) != 0.0).unwrap_or(2)
+}
+
+/// On which side of a triangle's plane a point lies: the sign, 0 in the plane.
+fn side(&[a, b, c]: &Corners, point: [f32; 3]) -> f64 {
+    let at = |[x, y, z]: [f32; 3]| Coord3D { x, y, z };
+    orient3d(at(a), at(b), at(c), at(point))
+}
+
+/// Which way three points turn, seen along an axis: the sign, 0 on one line.
+fn turn(axis: usize, points: [[f32; 3]; 3]) -> f64 {
+    let [a, b, c] = points.map(|point| Coord { x: point[(axis + 1) % 3], y: point[(axis + 2) % 3] });
+    orient2d(a, b, c)
+}
