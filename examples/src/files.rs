@@ -1,4 +1,4 @@
-//! [`write_atomically`]: a file is written whole, or not at all.
+//! [`write_atomically`]: a file is written whole, or not at all; [`check_file`] says beforehand where it cannot be.
 
 use std::ffi::OsString;
 use std::fs;
@@ -23,4 +23,19 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut fs::File) -> io::Re
         let _ = fs::remove_file(&part);
     }
     written
+}
+
+/// Says why a file of that name cannot be written, if its folder or its name tells.
+///
+/// # Errors
+/// A sentence, where its folder is missing or it is a folder itself.
+pub fn check_file(path: &Path) -> Result<(), String> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(format!("{} cannot be written, since there is no folder {}", path.display(), folder.display()));
+    }
+    if path.is_dir() || path.file_name().is_none() {
+        return Err(format!("{} cannot be written, since it is a folder", path.display()));
+    }
+    Ok(())
 }

@@ -14,7 +14,7 @@ use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 
-use crate::files::write_atomically;
+use crate::files::{check_file, write_atomically};
 
 /// `DefaultPlugins` for a window of that title.
 pub fn window_plugins(title: &str) -> PluginGroupBuilder {
@@ -107,6 +107,26 @@ pub fn check_picture_name(path: &Path) -> Result<(), String> {
     } else {
         Err(format!("the picture's name must end in .png, but it is {}", path.display()))
     }
+}
+
+/// Says why there can be no picture file of that name, if anything tells.
+///
+/// # Errors
+/// A sentence, where the name does not end in .png, its folder is missing or it is a folder itself.
+pub fn check_picture(path: &Path) -> Result<(), String> {
+    check_file(path)?;
+    check_picture_name(path)
+}
+
+/// A picture's width and height, as the command line gives them: `W,H`. [Units: pixels]
+///
+/// # Errors
+/// A sentence, where they are not two whole numbers from 16 to 8192.
+pub fn picture_size(text: &str) -> Result<UVec2, String> {
+    let sides = text.split_once(',').and_then(|(w, h)| Some((w.trim().parse().ok()?, h.trim().parse().ok()?)));
+    let size = sides.map(|(width, height)| UVec2::new(width, height));
+    let valid = |size: &UVec2| size.min_element() >= 16 && size.max_element() <= 8192;
+    size.filter(valid).ok_or("it must be two whole numbers from 16 to 8192, with a comma between them".to_owned())
 }
 
 fn save(image: &Image, path: &Path) -> Result<(), Box<dyn Error>> {

@@ -1,12 +1,13 @@
 //! [`Args`]: what the command line may say.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use bevy::math::DVec2;
 use bevy::prelude::*;
 use clap::Parser;
+use marchless_examples::files::check_file;
 use marchless_examples::look::LOOKS;
-use marchless_examples::picture::check_picture_name;
+use marchless_examples::picture::{check_picture, picture_size};
 
 /// A landscape to dig.
 #[derive(Parser, Debug)]
@@ -79,20 +80,8 @@ impl Args {
     pub(crate) fn check_files(&self) -> Result<(), String> {
         check_file(&self.out)?;
         let Some(picture) = &self.screenshot else { return Ok(()) };
-        check_file(picture)?;
-        check_picture_name(picture)
+        check_picture(picture)
     }
-}
-
-fn check_file(path: &Path) -> Result<(), String> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return Err(format!("{} cannot be written, since there is no folder {}", path.display(), folder.display()));
-    }
-    if path.is_dir() || path.file_name().is_none() {
-        return Err(format!("{} cannot be written, since it is a folder", path.display()));
-    }
-    Ok(())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -104,13 +93,6 @@ fn positive_pair(text: &str) -> Result<DVec2, String> {
     let sentence = "it must be two numbers above 0, with a comma between them";
     let (x, z) = text.split_once(',').ok_or(sentence)?;
     Ok(DVec2::new(positive(x).map_err(|_| sentence)?, positive(z).map_err(|_| sentence)?))
-}
-
-fn picture_size(text: &str) -> Result<UVec2, String> {
-    let sides = text.split_once(',').and_then(|(w, h)| Some((w.trim().parse().ok()?, h.trim().parse().ok()?)));
-    let size = sides.map(|(width, height)| UVec2::new(width, height));
-    let valid = |size: &UVec2| size.min_element() >= 16 && size.max_element() <= 8192;
-    size.filter(valid).ok_or("it must be two whole numbers from 16 to 8192, with a comma between them".to_owned())
 }
 
 fn dig(text: &str) -> Result<Dig, String> {
