@@ -7,7 +7,7 @@ use core::fmt::Debug;
 use std::collections::HashMap;
 
 use marchless::{
-    Block, Chunk, ChunkSamples, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Voxel, Weight,
+    Block, Chunk, ChunkSamples, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Topology, Voxel, Weight,
 };
 use proptest::prelude::*;
 
@@ -131,9 +131,10 @@ fn check_seams<W: Random>(
     cells: u32,
     bounds: Region,
     isovalue: f32,
+    topology: Topology,
 ) -> Result<(), TestCaseError> {
     let grid = grid::<W>(field, seed, cells, bounds);
-    let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+    let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
     let meshes = meshes(&grid, &settings);
 
     for (&position, mesh) in &meshes {
@@ -183,24 +184,27 @@ proptest! {
         min in [-3..3i32, -3..3, -3..3],
         size in [1..=3i32, 1..=3, 1..=2],
         isovalue in prop_oneof![3 => Just(0.0f32), 1 => -3.0..3.0f32],
+        topology in prop_oneof![Just(Topology::Separated), Just(Topology::Trilinear)],
     ) {
         let bounds = Region::new(min, core::array::from_fn(|axis| min[axis] + size[axis]));
-        check_seams::<i8>(field, seed, cells, bounds, isovalue)?;
-        check_seams::<i16>(field, seed, cells, bounds, isovalue)?;
-        check_seams::<f32>(field, seed, cells, bounds, isovalue)?;
+        check_seams::<i8>(field, seed, cells, bounds, isovalue, topology)?;
+        check_seams::<i16>(field, seed, cells, bounds, isovalue, topology)?;
+        check_seams::<f32>(field, seed, cells, bounds, isovalue, topology)?;
     }
 }
 
 #[test]
 fn borders_hold_in_the_largest_chunks_and_at_any_isovalue() {
-    for cells in [32, 62] {
-        let bounds = Region::new([-1, 0, 0], [1, 1, 1]);
-        check_seams::<i16>(Field::Smooth, 5, cells, bounds, 0.0).expect("sound seams");
-    }
-    for isovalue in [-200.0, -10.0, 3.5, 100.0] {
-        let bounds = Region::new([0, -1, 0], [2, 1, 1]);
-        check_seams::<i16>(Field::Noise, 6, 9, bounds, isovalue).expect("sound seams");
-        check_seams::<f32>(Field::Smooth, 7, 9, bounds, isovalue).expect("sound seams");
+    for topology in [Topology::Separated, Topology::Trilinear] {
+        for cells in [32, 62] {
+            let bounds = Region::new([-1, 0, 0], [1, 1, 1]);
+            check_seams::<i16>(Field::Smooth, 5, cells, bounds, 0.0, topology).expect("sound seams");
+        }
+        for isovalue in [-200.0, -10.0, 3.5, 100.0] {
+            let bounds = Region::new([0, -1, 0], [2, 1, 1]);
+            check_seams::<i16>(Field::Noise, 6, 9, bounds, isovalue, topology).expect("sound seams");
+            check_seams::<f32>(Field::Smooth, 7, 9, bounds, isovalue, topology).expect("sound seams");
+        }
     }
 }
 

@@ -1,5 +1,6 @@
-//! What every surface promises, whatever the samples are: closed within the box, 2-manifold, consistently oriented,
-//! nothing degenerate, normals of length 1; and what smooth fields get on top.
+//! What every surface promises, whatever the samples are and in both topologies: closed within the box, 2-manifold,
+//! consistently oriented, nothing degenerate, vertices where the crossings are, normals of length 1; and what smooth
+//! fields get on top.
 
 #[path = "support/fields.rs"]
 mod fields;
@@ -7,14 +8,19 @@ mod fields;
 use std::collections::HashMap;
 
 use fields::{Field, TestWeight};
-use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
-use proptest::prelude::*;
+use marchless::{ExtractionReport, MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
+use proptest::{prelude::*, sample::select};
 
-fn mesh<W: Weight>(samples: Samples<'_, W>, isovalue: f32) -> MeshBuffer {
+const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
+
+fn mesh<W: Weight>(samples: Samples<'_, W>, settings: &MeshSettings) -> MeshBuffer {
     let mut mesh = MeshBuffer::new();
-    let settings = MeshSettings { isovalue, ..MeshSettings::default() };
-    Mesher::new().mesh(samples, &settings, &mut mesh).expect("the samples can be meshed");
+    Mesher::new().mesh(samples, settings, &mut mesh).expect("the samples can be meshed");
     mesh
+}
+
+fn settings(isovalue: f32, topology: Topology) -> MeshSettings {
+    MeshSettings { isovalue, topology, ..MeshSettings::default() }
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -42,10 +48,13 @@ fn open_sides(mesh: &MeshBuffer) -> Vec<[u32; 2]> {
     sides.into_keys().collect()
 }
 
-fn check<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
-    let mesh = mesh(field.samples(), field.isovalue);
+fn check<W: TestWeight>(field: &Field<W>, topology: Topology) -> Result<(), TestCaseError> {
+    let settings = settings(field.isovalue, topology);
+    let mesh = mesh(field.samples(), &settings);
     let report = MeshReport::new(&mesh.positions, &mesh.indices);
     prop_assert!(report.is_clean(), "{}", report);
+    let report_of_places = ExtractionReport::new(field.samples(), &settings, &mesh);
+    prop_assert!(report_of_places.is_sound(), "{}", report_of_places);
 
     let open = open_sides(&mesh);
     prop_assert_eq!(open.len(), report.boundary_edges);
@@ -76,32 +85,36 @@ fn enclosed<W: TestWeight>(mut field: Field<W>) -> Field<W> {
     field
 }
 
-fn check_enclosed<W: TestWeight>(field: Field<W>) -> Result<(), TestCaseError> {
-    let field = enclosed(field);
-    let mesh = mesh(field.samples(), field.isovalue);
+fn check_enclosed<W: TestWeight>(field: &Field<W>, topology: Topology) -> Result<(), TestCaseError> {
+    let mesh = mesh(field.samples(), &settings(field.isovalue, topology));
     let report = MeshReport::new(&mesh.positions, &mesh.indices);
     prop_assert!(report.is_closed() && report.is_clean(), "{}", report);
     prop_assert_eq!(report.euler % 2, 0);
     Ok(())
 }
 
+fn check_both<W: TestWeight>(field: Field<W>) -> Result<(), TestCaseError> {
+    for topology in TOPOLOGIES {
+        check(&field, topology)?;
+    }
+    let field = enclosed(field);
+    TOPOLOGIES.into_iter().try_for_each(|topology| check_enclosed(&field, topology))
+}
+
 proptest! {
     #[test]
     fn fields_of_i8_have_sound_surfaces(field in Field::<i8>::any()) {
-        check(&field)?;
-        check_enclosed(field)?;
+        check_both(field)?;
     }
 
     #[test]
     fn fields_of_i16_have_sound_surfaces(field in Field::<i16>::any()) {
-        check(&field)?;
-        check_enclosed(field)?;
+        check_both(field)?;
     }
 
     #[test]
     fn fields_of_f32_have_sound_surfaces(field in Field::<f32>::any()) {
-        check(&field)?;
-        check_enclosed(field)?;
+        check_both(field)?;
     }
 
     /// Whole steps, so that the samples are the plane's exactly.
@@ -110,6 +123,7 @@ proptest! {
         slope in proptest::array::uniform3(-200i16..=200),
         offset in -1500i16..1500,
         padded: bool,
+        topology in select(&TOPOLOGIES[..]),
     ) {
         prop_assume!(slope != [0; 3]);
         let shape = Shape::new([9, 6, 7]).expect("the sizes are small");
@@ -121,7 +135,7 @@ proptest! {
             })
             .collect();
         let samples = Samples::new(shape, &weights).expect("one weight a sample");
-        let mesh = mesh(if padded { samples.padded() } else { samples }, 0.0);
+        let mesh = mesh(if padded { samples.padded() } else { samples }, &settings(0.0, topology));
 
         let slope = slope.map(f32::from);
         let normal = unit(slope);
@@ -143,6 +157,7 @@ proptest! {
         center in proptest::array::uniform3(6.0f32..9.0),
         radius in 2.5f32..5.0,
         isovalue in -0.5f32..0.5,
+        topology in select(&TOPOLOGIES[..]),
     ) {
         let shape = Shape::cube(16).expect("16 is small");
         let weights: Vec<f32> = (0..shape.len())
@@ -151,7 +166,8 @@ proptest! {
                 dot(from_center, from_center).sqrt() - radius
             })
             .collect();
-        let mesh = mesh(Samples::new(shape, &weights).expect("one weight a sample"), isovalue);
+        let samples = Samples::new(shape, &weights).expect("one weight a sample");
+        let mesh = mesh(samples, &settings(isovalue, topology));
         let report = MeshReport::new(&mesh.positions, &mesh.indices);
         prop_assert!(report.is_closed() && report.is_clean(), "{}", report);
         prop_assert_eq!((report.components, report.euler), (1, 2));
@@ -182,9 +198,12 @@ fn rows_of_4096_cells_are_sound() {
         (0..shape.len() as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 20) as i16 % 3 - 1).collect();
     for size in [[4097, 3, 3], [3, 4097, 3], [3, 3, 4097]] {
         let shape = Shape::new(size).expect("it fits in memory");
-        let mesh = mesh(Samples::new(shape, &weights).expect("one weight a sample"), 0.0);
-        let report = MeshReport::new(&mesh.positions, &mesh.indices);
-        assert!(report.is_clean() && report.triangles > 10_000, "{report}");
+        let samples = Samples::new(shape, &weights).expect("one weight a sample");
+        for topology in TOPOLOGIES {
+            let mesh = mesh(samples, &settings(0.0, topology));
+            let report = MeshReport::new(&mesh.positions, &mesh.indices);
+            assert!(report.is_clean() && report.triangles > 10_000, "{report}");
+        }
     }
 }
 
