@@ -7,6 +7,7 @@
 //! samples, mesh ──extraction──▶ which vertex lies on which crossing
 //! ```
 
+mod boxes;
 mod crossings;
 mod extraction;
 mod links;

@@ -1,187 +1,140 @@
-//! Triangles that cross each other, found with a tree of boxes.
-//!
-//! Each node of the tree halves its triangles along the axis on which their middles are spread the most, so that the
-//! tree is as deep for a heap or for a single vertex far out as for an even surface, and its size is that of the mesh.
-//! (Refused: a uniform grid, which is faster on even surfaces, but where one vertex lies at 10³⁰ has everything in one
-//! of its cells; and a sweep along one axis, of which a plane across it is the worst case.)
+//! Triangles that cross each other: a tree of boxes finds pairs, planes rule most of them out, exact predicates judge
+//! the rest.
 
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
 
 use super::{
-    MeshReport, is_finite,
+    MeshReport,
+    boxes::{Bounds, BoxTree},
+    is_finite,
     places::Places,
-    predicates::{cross, has_no_area},
+    predicates::{Corners, cross, has_no_area},
 };
 
-/// Triangles in a leaf of the tree, at most.
-const LEAF: usize = 4;
-
 /// How many of the triangles have no area, and how many pairs of the others cross.
+///
+/// `duplicates`: whether there are any.
 pub(super) fn count(
     positions: &[[f32; 3]],
     mut triangles: Vec<[u32; 3]>,
     places: &Places,
     duplicates: bool,
 ) -> (usize, usize) {
-    triangles.retain(|triangle| triangle.iter().all(|&vertex| is_finite(positions[vertex as usize])));
+    let corners = |triangle: &[u32; 3]| triangle.map(|vertex| positions[vertex as usize]);
     let mut flat = 0;
     triangles.retain(|triangle| {
-        let none = has_no_area(&triangle.map(|vertex| positions[vertex as usize]));
-        flat += usize::from(none);
-        !none
+        let corners = corners(triangle);
+        let finite = corners.iter().all(|&corner| is_finite(corner));
+        let no_area = finite && has_no_area(&corners);
+        flat += usize::from(no_area);
+        finite && !no_area
     });
     if duplicates {
         triangles.iter_mut().for_each(|triangle| triangle.sort_unstable());
         triangles.sort_unstable();
         triangles.dedup();
     }
-    let mut items: Vec<Item> = triangles.into_iter().map(|triangle| Item::new(positions, triangle, places)).collect();
-    let mut tree = Tree { positions, nodes: Vec::with_capacity(items.len().div_ceil(LEAF) * 2), found: 0 };
-    if !items.is_empty() {
-        tree.grow(&mut items, 0);
-        tree.within(&items, 0);
-    }
-    (flat, tree.found)
+    triangles.truncate(i32::MAX as usize);
+
+    let boxes: Vec<Bounds> = triangles.iter().map(|triangle| Bounds::of(&corners(triangle))).collect();
+    let (tree, order) = BoxTree::of(&boxes);
+    let triangles: Vec<Triangle> = order
+        .map(|index| {
+            let vertices = triangles[index];
+            Triangle::new(corners(&vertices), vertices.map(|vertex| places.first(vertex)), &boxes[index])
+        })
+        .collect();
+    drop(boxes);
+    let mut found = 0;
+    let _ = tree.visit_pairs(&mut |a, b| {
+        found += usize::from(triangles[a].crosses(&triangles[b]));
+        if found < MeshReport::MOST_CROSSINGS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    (flat, found)
 }
 
-/// A triangle and its box.
-struct Item {
-    bounds: Bounds,
+/// A triangle with an area, and what rules out most crossings with others.
+struct Triangle {
+    corners: Corners,
+    /// The same numbers for the same places.
     vertices: [u32; 3],
+    /// Across the plane, about as long as twice the area.
+    normal: [f64; 3],
+    /// Times the size of a box around a point and the triangle: what the product of the normal and the point's
+    /// distance from the first corner must exceed, so that rounding cannot have changed its sign.
+    doubt: f64,
+    /// Of the box around it.
+    size: f64,
 }
 
-impl Item {
-    fn new(positions: &[[f32; 3]], vertices: [u32; 3], places: &Places) -> Self {
-        let mut bounds = Bounds::NONE;
-        for vertex in vertices {
-            bounds.include(&Bounds { min: positions[vertex as usize], max: positions[vertex as usize] });
-        }
-        Self { bounds, vertices: vertices.map(|vertex| places.first(vertex)) }
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Bounds {
-    min: [f32; 3],
-    max: [f32; 3],
-}
-
-impl Bounds {
-    const NONE: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
-
-    fn include(&mut self, other: &Self) {
-        for axis in 0..3 {
-            self.min[axis] = self.min[axis].min(other.min[axis]);
-            self.max[axis] = self.max[axis].max(other.max[axis]);
-        }
+impl Triangle {
+    fn new(corners: Corners, vertices: [u32; 3], bounds: &Bounds) -> Self {
+        let [u, v] = [corners[1], corners[2]].map(|corner| from(corners[0], corner));
+        let normal = [0, 1, 2].map(|axis| {
+            let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+            u[i] * v[j] - u[j] * v[i]
+        });
+        // Shewchuk's bound for the product is 7.1 times 2⁻⁵³ times six products of three lengths, none of which is longer
+        // than the box that they are in.
+        let [u, v] = [u, v].map(|side| side.iter().fold(0.0, |longest: f64, length| longest.max(length.abs())));
+        const DOUBT: f64 = 64.0 / (1u64 << 53) as f64;
+        Self { corners, vertices, normal, doubt: DOUBT * u * v, size: bounds.size() }
     }
 
-    fn meets(&self, other: &Self) -> bool {
-        let mut meets = true;
-        for axis in 0..3 {
-            meets &= (self.min[axis] <= other.max[axis]) & (other.min[axis] <= self.max[axis]);
-        }
-        meets
-    }
-
-    fn middle(&self, axis: usize) -> f32 {
-        self.min[axis] * 0.5 + self.max[axis] * 0.5
-    }
-}
-
-/// A part of the items, next to each other.
-#[derive(Clone, Copy)]
-struct Node {
-    bounds: Bounds,
-    first: usize,
-    len: usize,
-    /// The node of the second half; that of the first is the next one. 0 where the items are not halved.
-    second: usize,
-}
-
-struct Tree<'a> {
-    positions: &'a [[f32; 3]],
-    nodes: Vec<Node>,
-    /// Crossings.
-    found: usize,
-}
-
-impl Tree<'_> {
-    /// Adds a node for `items`, which are at `first` among all.
-    fn grow(&mut self, items: &mut [Item], first: usize) -> usize {
-        let (mut bounds, mut middles) = (Bounds::NONE, Bounds::NONE);
-        for item in &*items {
-            bounds.include(&item.bounds);
-            let middle = [0, 1, 2].map(|axis| item.bounds.middle(axis));
-            middles.include(&Bounds { min: middle, max: middle });
-        }
-        let node = self.nodes.len();
-        self.nodes.push(Node { bounds, first, len: items.len(), second: 0 });
-        if items.len() > LEAF {
-            let spread = |axis: usize| middles.max[axis] - middles.min[axis];
-            let axis = (0..3).max_by(|&a, &b| spread(a).total_cmp(&spread(b))).unwrap_or(0);
-            let half = items.len() / 2;
-            items.select_nth_unstable_by(half, |a, b| a.bounds.middle(axis).total_cmp(&b.bounds.middle(axis)));
-            let (low, high) = items.split_at_mut(half);
-            self.grow(low, first);
-            self.nodes[node].second = self.grow(high, first + half);
-        }
-        node
-    }
-
-    /// Looks at all pairs of a node's items.
-    fn within(&mut self, items: &[Item], node: usize) {
-        let Node { first, len, second, .. } = self.nodes[node];
-        if second == 0 {
-            for i in first..first + len {
-                for j in i + 1..first + len {
-                    self.compare(&items[i], &items[j]);
-                }
+    /// Whether two triangles whose boxes meet have a point in common other than common corners and sides.
+    #[inline(always)]
+    fn crosses(&self, other: &Self) -> bool {
+        // The corners that both have in common, a bit each.
+        let (mut of_self, mut of_other) = (0u32, 0u32);
+        for (i, a) in self.vertices.iter().enumerate() {
+            for (j, b) in other.vertices.iter().enumerate() {
+                let same = u32::from(a == b);
+                of_self |= same << i;
+                of_other |= same << j;
             }
-        } else {
-            self.within(items, node + 1);
-            self.within(items, second);
-            self.between(items, node + 1, second);
         }
+        // A copy is not clear of the original.
+        of_self == 7
+            || !self.is_clear_of(other, of_other) && !other.is_clear_of(self, of_self) && self.crosses_exactly(other)
     }
 
-    /// Looks at all pairs of an item of one node and one of the other.
-    fn between(&mut self, items: &[Item], a: usize, b: usize) {
-        let (node_a, node_b) = (self.nodes[a], self.nodes[b]);
-        if !node_a.bounds.meets(&node_b.bounds) || self.found >= MeshReport::MOST_CROSSINGS {
-            return;
+    /// Whether the other one's corners, but those that are `common`, are all clearly on the same side of the plane; or, of
+    /// a neighbour, just off it.
+    #[inline(always)]
+    fn is_clear_of(&self, other: &Self, common: u32) -> bool {
+        let doubt = self.doubt * (self.size + other.size);
+        let (mut above, mut below) = (common, common);
+        for (i, &corner) in other.corners.iter().enumerate() {
+            let [x, y, z] = from(self.corners[0], corner);
+            let height = x * self.normal[0] + y * self.normal[1] + z * self.normal[2];
+            above |= u32::from(height > doubt) << i;
+            below |= u32::from(height < -doubt) << i;
         }
-        if node_a.second == 0 && node_b.second == 0 {
-            for item in &items[node_a.first..][..node_a.len] {
-                if item.bounds.meets(&node_b.bounds) {
-                    for other in &items[node_b.first..][..node_b.len] {
-                        self.compare(item, other);
-                    }
-                }
-            }
-        } else if node_a.len >= node_b.len {
-            self.between(items, a + 1, b);
-            self.between(items, node_a.second, b);
-        } else {
-            self.between(items, a, b + 1);
-            self.between(items, a, node_b.second);
-        }
+        (above == 7) | (below == 7)
     }
 
-    fn compare(&mut self, a: &Item, b: &Item) {
-        if !a.bounds.meets(&b.bounds) || self.found >= MeshReport::MOST_CROSSINGS {
-            return;
-        }
-        // Brings what they have in common to the front of both.
-        let (mut a, mut b, mut common) = (a.vertices, b.vertices, 0);
+    #[cold]
+    #[inline(never)]
+    fn crosses_exactly(&self, other: &Self) -> bool {
+        // What they have in common comes first in both.
+        let (mut a, mut b) = ((self.corners, self.vertices), (other.corners, other.vertices));
+        let mut common = 0;
         for i in 0..3 {
-            if let Some(j) = (common..3).find(|&j| b[j] == a[i]) {
-                b.swap(common, j);
-                a.swap(common, i);
+            if let Some(j) = (common..3).find(|&j| b.1[j] == a.1[i]) {
+                a.0.swap(common, i);
+                a.1.swap(common, i);
+                b.0.swap(common, j);
+                b.1.swap(common, j);
                 common += 1;
             }
         }
-        let [a, b] = [a, b].map(|vertices| vertices.map(|vertex| self.positions[vertex as usize]));
-        self.found += usize::from(cross(&a, &b, common));
+        cross(&a.0, &b.0, common)
     }
+}
+
+/// From one point to another, in `f64`, where it does not overflow.
+#[inline(always)]
+fn from(start: [f32; 3], end: [f32; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| f64::from(end[axis]) - f64::from(start[axis]))
 }

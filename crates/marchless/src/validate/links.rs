@@ -159,17 +159,18 @@ fn is_ring(link: &mut [Segment]) -> bool {
     if !(3..=16).contains(&link.len()) {
         return false;
     }
-    let start = link[0][0];
     let mut end = link[0][1];
     for place in 1..link.len() {
-        // A ring that closes too early is only a part of the link.
-        let Some(next) = link[place..].iter().position(|segment| segment[0] == end && end != start) else {
+        let (before, after) = link.split_at(place);
+        // Where a segment has started already, the ring closes too early or touches itself.
+        if before.iter().any(|segment| segment[0] == end) {
             return false;
-        };
+        }
+        let Some(next) = after.iter().position(|segment| segment[0] == end) else { return false };
         link.swap(place, place + next);
         end = link[place][1];
     }
-    end == start
+    end == link[0][0]
 }
 
 /// How many times two sets become one where all the vertices of each triangle are joined.

@@ -1,8 +1,9 @@
-//! A mesh for every kind of defect, which has that one and no other; and a plain count of everything.
+//! A mesh for every kind of defect, which has that one and no other.
+
+mod plain;
 
 use super::*;
 use alloc::{string::ToString, vec};
-use proptest::prelude::*;
 
 type Mesh = (Vec<[f32; 3]>, Vec<u32>);
 
@@ -194,60 +195,143 @@ fn duplicates_and_loose_ends_are_counted() {
     assert!(text.contains("1 duplicate vertex, 2 unused vertices, 1 non-finite vertex, 2 indices"), "{text}");
 }
 
-/// The same counts by comparing everything with everything.
-fn plainly(vertices: u32, indices: &[u32]) -> [usize; 4] {
-    let triangles: Vec<_> = indices
-        .chunks_exact(3)
-        .filter(|t| t.iter().all(|&v| v < vertices) && t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
-        .collect();
-    let (mut boundary, mut crowded, mut oriented_wrong) = (0, 0, 0);
-    for a in 0..vertices {
-        for b in a + 1..vertices {
-            let runs =
-                |from, to| triangles.iter().filter(|t| (0..3).any(|i| t[i] == from && t[(i + 1) % 3] == to)).count();
-            let (up, down) = (runs(a, b), runs(b, a));
-            boundary += usize::from(up + down == 1);
-            crowded += usize::from(up + down > 2);
-            oriented_wrong += usize::from(up.abs_diff(down) >= 2);
-        }
-    }
-    let mut pinched = 0;
-    for v in 0..vertices {
-        // The link of a vertex: one segment a triangle. It must be one path or one ring.
-        let link: Vec<[u32; 2]> = triangles
-            .iter()
-            .filter_map(|t| (0..3).find(|&i| t[i] == v).map(|i| [t[(i + 1) % 3], t[(i + 2) % 3]]))
-            .collect();
-        let crowded = (0..vertices).any(|w| link.iter().flatten().filter(|&&end| end == w).count() > 2);
-        let mut reached: Vec<u32> = link.first().map_or(vec![], |segment| segment.to_vec());
-        for _ in &link {
-            for segment in &link {
-                if segment.iter().any(|end| reached.contains(end)) {
-                    reached.extend(segment);
-                }
-            }
-        }
-        pinched += usize::from(crowded || !link.iter().flatten().all(|end| reached.contains(end)));
-    }
-    [boundary, crowded, oriented_wrong, pinched]
+/// A strip of `n` quads that closes on itself; with a twist it has one side only.
+fn strip(n: u32, twisted: bool) -> Mesh {
+    let positions = (0..2 * n).map(|v| {
+        let angle = (v / 2) as f32 / n as f32 * 2.0 * core::f32::consts::PI;
+        let lean = (v % 2) as f32 * if twisted { angle / 2.0 } else { 0.0 };
+        let radius = 3.0 + libm::cosf(lean) * (v % 2) as f32;
+        [radius * libm::cosf(angle), radius * libm::sinf(angle), libm::sinf(lean) * (v % 2) as f32]
+    });
+    let at = |i: u32, side: u32| 2 * (i % n) + if twisted && i == n { 1 - side } else { side };
+    let quad = |i| [at(i, 0), at(i + 1, 0), at(i + 1, 1), at(i, 0), at(i + 1, 1), at(i, 1)];
+    (positions.collect(), (0..n).flat_map(quad).collect())
 }
 
-proptest! {
-    #[test]
-    fn counts_equal_the_plain_ones(indices in proptest::collection::vec(0u32..8, 0..40)) {
-        let positions: Vec<[f32; 3]> = (0..7).map(|i| [i as f32, (i * i) as f32, (i * i * i) as f32]).collect();
-        let report = MeshReport::new(&positions, &indices);
-        let found = [
-            report.boundary_edges, report.non_manifold_edges, report.inconsistent_edges, report.non_manifold_vertices,
-        ];
-        prop_assert_eq!(found, plainly(7, &indices));
-    }
+/// Two surfaces sewn together along a triangle that both lose: the first of the first, the last of the second.
+fn sewn(first: &Mesh, second: &Mesh) -> Mesh {
+    let (mut first, mut second) = (first.clone(), second.clone());
+    let rest = second.1.split_off(second.1.len() - 3);
+    let rim: Vec<u32> = first.1.drain(..3).collect();
+    // The other way round.
+    joined(&first, &second, &[(rest[0], rim[0]), (rest[1], rim[2]), (rest[2], rim[1])])
+}
 
-    #[test]
-    fn nothing_panics(
-        positions in proptest::collection::vec(proptest::array::uniform3(proptest::num::f32::ANY), 0..6),
-        indices in proptest::collection::vec(prop_oneof![0u32..6, any::<u32>()], 0..30),
-    ) {
-        let _ = MeshReport::new(&positions, &indices).to_string();
+#[test]
+fn genus_counts_handles() {
+    let without_one = |(positions, mut indices): Mesh| {
+        indices.drain(..3);
+        (positions, indices)
+    };
+    let (sphere, torus) = (cube([0.0; 3]), torus(7, 12));
+    let two = joined(&torus, &torus, &[]);
+    let double = sewn(&torus, &torus);
+    let cases = [
+        ("a sphere", sphere.clone(), Some(0), 1, 2),
+        ("a torus", torus.clone(), Some(1), 1, 0),
+        ("two tori", two.clone(), Some(2), 2, 0),
+        ("a double torus", double.clone(), Some(2), 1, -2),
+        ("a triple torus", sewn(&double, &torus), Some(3), 1, -4),
+        ("a sphere sewn to a torus", sewn(&sphere, &torus), Some(1), 1, 0),
+        ("a double torus and a sphere", joined(&double, &sphere, &[]), Some(2), 2, 0),
+        ("a disc", without_one(sphere.clone()), Some(0), 1, 1),
+        ("a torus with a hole", without_one(torus.clone()), Some(1), 1, -1),
+        ("a ribbon", strip(9, false), Some(0), 1, 0),
+        ("a Möbius strip", strip(9, true), None, 1, 0),
+        ("spheres that share a vertex", joined(&sphere, &sphere, &[(0, 7)]), None, 1, 3),
+        ("nothing", (vec![], vec![]), Some(0), 0, 0),
+    ];
+    for (name, mesh, genus, components, euler) in cases {
+        let report = report(&mesh);
+        assert_eq!((report.genus, report.components, report.euler), (genus, components, euler), "{name}: {report}");
     }
+}
+
+/// The mesh has these defects and no others.
+#[track_caller]
+fn has_only(report: &MeshReport, defects: &[(usize, &str)]) {
+    let found: Vec<_> =
+        report.defects().iter().filter(|defect| defect.0 > 0).map(|defect| (defect.0, defect.1)).collect();
+    assert_eq!(found, defects, "{report}");
+    assert_eq!(report.is_clean(), defects.is_empty());
+    for &(count, one, several) in report.defects().iter().filter(|defect| defect.0 > 0) {
+        assert!(report.to_string().contains(&alloc::format!(", {count} {}, ", if count == 1 { one } else { several })));
+    }
+}
+
+#[test]
+fn each_defect_is_told_from_all_others() {
+    let base = cube([0.0; 3]);
+    let with = |vertices: &[[f32; 3]], indices: &[u32]| {
+        let (mut mesh, first) = (base.clone(), base.0.len() as u32);
+        mesh.0.extend(vertices);
+        mesh.1.extend(indices.iter().map(|&index| index + first));
+        report(&mesh)
+    };
+    has_only(&report(&base), &[]);
+    has_only(&with(&[], &[u32::MAX - 8, 0, 1]), &[(3, "index out of range")]);
+    has_only(&with(&[], &[]), &[]);
+    let mut stray = base.clone();
+    stray.1.extend([0, 1]);
+    has_only(&report(&stray), &[(2, "stray index")]);
+    let mut repeated = base.clone();
+    repeated.1.extend([0, 1, 1]);
+    has_only(&report(&repeated), &[(1, "triangle with a repeated index")]);
+
+    let apart = [[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0]];
+    has_only(&with(&apart, &[0, 1, 2]), &[]);
+    has_only(&with(&[[5.0; 3]], &[]), &[(1, "unused vertex")]);
+    has_only(&with(&[apart[0], apart[1], [7.0, 0.0, 0.0]], &[0, 1, 2]), &[(1, "triangle of zero area")]);
+    has_only(&with(&[apart[0], apart[1], [5.0, f32::NAN, 0.0]], &[0, 1, 2]), &[(1, "non-finite vertex")]);
+    has_only(&with(&[apart[0], apart[1], [1.0, 1.0, 0.0]], &[0, 1, 2]), &[(1, "duplicate vertex")]);
+    has_only(&with(&apart, &[0, 1, 2, 2, 1, 0]), &[(1, "duplicate triangle")]);
+    has_only(
+        &with(&[[0.5, 0.25, 0.5], [5.0, 0.25, 0.5], [5.0, 1.0, 0.5]], &[0, 1, 2]),
+        &[(1, "pair of crossing triangles")],
+    );
+    let more = [apart[0], apart[1], apart[2], [6.0, 1.0, 0.0], [6.0, 1.0, 1.0], [5.0, 0.0, 1.0], [5.0, -1.0, 0.0]];
+    has_only(&with(&more[..4], &[0, 1, 2, 1, 2, 3]), &[(1, "inconsistently oriented edge")]);
+    has_only(&with(&[more[0], more[1], more[2], more[5], more[6]], &[0, 1, 2, 0, 3, 4]), &[(1, "non-manifold vertex")]);
+    // A spine of three pages cannot be without the vertices at its ends.
+    has_only(
+        &with(&[more[0], more[1], more[2], more[5], more[6]], &[0, 1, 2, 1, 0, 3, 0, 1, 4]),
+        &[(1, "non-manifold edge"), (2, "non-manifold vertex")],
+    );
+}
+
+#[test]
+fn areas_are_exact() {
+    let area = |corners: [[f32; 3]; 3]| MeshReport::new(&corners, &[0, 1, 2]).zero_area_triangles == 0;
+    let tiny = f32::from_bits(1);
+    assert!(area([[0.0; 3], [tiny, 0.0, 0.0], [0.0, tiny, 0.0]]));
+    assert!(area([[0.0; 3], [f32::MAX; 3], [1.0, 1.0, 1.0 + f32::EPSILON]]));
+    assert!(area([[f32::MIN; 3], [f32::MAX; 3], [0.0, tiny, 0.0]]));
+    assert!(area([[f32::MIN, 0.0, 0.0], [f32::MAX, 0.0, 0.0], [0.0, 0.0, tiny]]));
+    assert!(!area([[f32::MIN; 3], [f32::MAX; 3], [tiny; 3]]));
+    assert!(!area([[tiny; 3], [2.0 * tiny; 3], [5.0 * tiny; 3]]));
+    assert!(!area([[1.0; 3], [1.0; 3], [0.0; 3]]));
+    // Not in `f64`: the products need 48 and more bits, and cancel.
+    let [a, b] = [1.0 + f32::EPSILON, 1.0 - f32::EPSILON];
+    assert!(area([[0.0; 3], [a, 1.0, 0.0], [1.0, b, 0.0]]));
+}
+
+#[test]
+fn rims_beside_the_box_are_cracks() {
+    // A square within x from 0 to 2, y from 0 to 1, in the plane z = 0.5.
+    let positions = [[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [2.0, 1.0, 0.5], [-0.0, 1.0, 0.5]];
+    let indices = [0, 1, 2, 0, 2, 3];
+    let cracks = |min, max| MeshReport::in_box(&positions, &indices, [min, max]).cracks;
+    assert_eq!(cracks([0.0; 3], [2.0, 1.0, 1.0]), 0);
+    assert_eq!(cracks([0.0; 3], [2.0, 2.0, 1.0]), 1);
+    assert_eq!(cracks([0.0; 3], [3.0, 2.0, 1.0]), 2);
+    assert_eq!(cracks([-1.0; 3], [3.0; 3]), 4);
+    assert_eq!(cracks([-1.0, -1.0, 0.5], [3.0; 3]), 0, "all of it lies on a face");
+    assert_eq!(cracks([0.0; 3], [2.0, 0.5, 1.0]), 3, "half of it is beyond the box");
+    assert_eq!(cracks([f32::NAN; 3], [f32::NAN; 3]), 4);
+    let report = MeshReport::in_box(&positions, &indices, [[0.0; 3], [3.0, 1.0, 1.0]]);
+    has_only(&report, &[(1, "crack")]);
+    assert_eq!(report, MeshReport { cracks: 1, ..MeshReport::new(&positions, &indices) });
+    // From one face to another.
+    let positions = [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [1.0, 0.5, 0.5]];
+    assert_eq!(MeshReport::in_box(&positions, &[0, 1, 2], [[0.0; 3], [1.0; 3]]).cracks, 3);
 }
