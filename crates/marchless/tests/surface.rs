@@ -7,12 +7,16 @@ mod fields;
 use std::collections::HashMap;
 
 use fields::{Field, TestWeight};
-use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 use proptest::prelude::*;
 
 fn mesh<W: Weight>(samples: Samples<'_, W>, isovalue: f32) -> MeshBuffer {
+    meshed(samples, isovalue, Topology::Separated)
+}
+
+fn meshed<W: Weight>(samples: Samples<'_, W>, isovalue: f32, topology: Topology) -> MeshBuffer {
     let mut mesh = MeshBuffer::new();
-    let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+    let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
     Mesher::new().mesh(samples, &settings, &mut mesh).expect("the samples can be meshed");
     mesh
 }
@@ -43,7 +47,12 @@ fn open_sides(mesh: &MeshBuffer) -> Vec<[u32; 2]> {
 }
 
 fn check<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
-    let mesh = mesh(field.samples(), field.isovalue);
+    check_with(field, Topology::Separated)?;
+    check_with(field, Topology::Trilinear)
+}
+
+fn check_with<W: TestWeight>(field: &Field<W>, topology: Topology) -> Result<(), TestCaseError> {
+    let mesh = meshed(field.samples(), field.isovalue, topology);
     let report = MeshReport::new(&mesh.positions, &mesh.indices);
     prop_assert!(report.is_clean(), "{}", report);
 
@@ -78,10 +87,12 @@ fn enclosed<W: TestWeight>(mut field: Field<W>) -> Field<W> {
 
 fn check_enclosed<W: TestWeight>(field: Field<W>) -> Result<(), TestCaseError> {
     let field = enclosed(field);
-    let mesh = mesh(field.samples(), field.isovalue);
-    let report = MeshReport::new(&mesh.positions, &mesh.indices);
-    prop_assert!(report.is_closed() && report.is_clean(), "{}", report);
-    prop_assert_eq!(report.euler % 2, 0);
+    for topology in [Topology::Separated, Topology::Trilinear] {
+        let mesh = meshed(field.samples(), field.isovalue, topology);
+        let report = MeshReport::new(&mesh.positions, &mesh.indices);
+        prop_assert!(report.is_closed() && report.is_clean(), "{}", report);
+        prop_assert_eq!(report.euler % 2, 0);
+    }
     Ok(())
 }
 
