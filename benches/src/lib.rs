@@ -1,8 +1,12 @@
 //! The fields that benches mesh: they differ in how much surface there is, and in how it lies.
 
+mod table;
+
 use std::thread;
 
 use noise::{Fbm, MultiFractal, NoiseFn, Perlin};
+
+pub use table::aligned;
 
 /// A kind of field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,7 +96,7 @@ fn fill(size: u32, distance: impl Fn([u32; 3]) -> f64 + Sync) -> Vec<f32> {
 }
 
 /// The output of Sebastiano Vigna's `SplitMix64` at a place in its sequence.
-fn split_mix(index: u64) -> u64 {
+pub fn split_mix(index: u64) -> u64 {
     let mut bits = index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use criterion::{BenchmarkGroup, measurement::WallTime};
 use marchless::Weight;
+use marchless_benches::aligned;
 
 use crate::case::Case;
 
@@ -212,24 +213,4 @@ pub(crate) fn duration(seconds: f64) -> String {
         ..0.1 => format!("{:.2} ms", seconds * 1e3),
         _ => format!("{:.0} ms", seconds * 1e3),
     }
-}
-
-/// A Markdown table whose columns are as wide as need be; the first row is its head.
-fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0).max(3);
-    let widths: [usize; N] = core::array::from_fn(width);
-    let mut table = String::new();
-    for (index, row) in rows.iter().enumerate() {
-        for (cell, &width) in row.iter().zip(&widths) {
-            table += &format!("| {cell}{} ", " ".repeat(width - cell.chars().count()));
-        }
-        table += "|\n";
-        if index == 0 {
-            for width in widths {
-                table += &format!("|{}", "-".repeat(width + 2));
-            }
-            table += "|\n";
-        }
-    }
-    table
 }

@@ -1,6 +1,10 @@
 //! The example `mesh_volume`: every type of sample in every format is the mesh of the whole volume, and the surface
 //! lies between the same samples as in the file's own numbers.
 
+#[path = "mesh_volume/check.rs"]
+mod check;
+#[path = "mesh_volume/chunks.rs"]
+mod chunks;
 #[path = "mesh_volume/program.rs"]
 mod program;
 #[path = "mesh_volume/readers.rs"]

@@ -1,6 +1,6 @@
 //! [`Args`]: what the command line may say.
 
-use std::fs;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
@@ -37,6 +37,25 @@ pub(crate) struct Args {
     #[arg(long, value_name = "X,Y,Z", value_parser = spacing, default_value = "1,1,1", allow_hyphen_values = true)]
     pub(crate) spacing: [f64; 3],
 
+    /// Let the surface have the topology of the trilinear interpolant in every cell, rather than separate what is inside
+    /// wherever the signs of a cell's corners leave that open.
+    #[arg(long)]
+    pub(crate) exact: bool,
+
+    /// Write one mesh per chunk of N cells along each axis (fewer at the far ends) rather than a single one.
+    ///
+    /// The files are OUT.0000.ply and so on, numbered by chunk, x fastest; together they are the whole mesh, in its
+    /// coordinates. A chunk without surface has no file, and loses an old one. A layer of chunks is held in memory.
+    #[arg(long, value_name = "N", value_parser = cells, allow_hyphen_values = true)]
+    pub(crate) chunk: Option<NonZeroU32>,
+
+    /// Print a report of the mesh's soundness; with any defect, write nothing and end with exit code 3.
+    ///
+    /// Where the surface leaves the volume it may be open. Each chunk is examined by itself. The mesh is held in memory:
+    /// a layer of chunks at a time with --chunk, otherwise all of it.
+    #[arg(long)]
+    pub(crate) check: bool,
+
     /// The mesh; an old file is replaced, but only by a whole new one.
     #[arg(short, long, value_name = "OUT.{ply,obj,stl,glb}")]
     pub(crate) output: PathBuf,
@@ -46,13 +65,12 @@ impl Args {
     /// Says what is wrong with the files' names and places, if anything is, before any work is done.
     ///
     /// # Errors
-    /// [`Error`] where the output would replace the input, has no folder, is no file or of no known format.
+    /// [`Error`] where the output would replace the input (chunks are looked at later), has no folder, is no file or of
+    /// no known format.
     pub(crate) fn check_files(&self) -> Result<(), Error> {
         let path = || self.output.clone();
-        if let (Ok(input), Ok(output)) = (fs::canonicalize(&self.input), fs::canonicalize(&self.output))
-            && input == output
-        {
-            return Err(Error::SameFile { path: path() });
+        if self.chunk.is_none() {
+            self.check_replaced(&self.output)?;
         }
         if !FORMATS.contains(&&*extension(&self.output)) {
             return Err(Error::OutputFormat { path: path() });
@@ -61,8 +79,21 @@ impl Args {
         if !folder.is_dir() {
             return Err(Error::NoFolder { path: path(), folder: folder.to_owned() });
         }
-        if self.output.exists() && !self.output.is_file() {
-            return Err(Error::OutputNotAFile { path: path() });
+        Ok(())
+    }
+
+    /// Says what is wrong with replacing what is at `path`, if anything is.
+    ///
+    /// # Errors
+    /// [`Error::SameFile`] where it is the input, [`Error::OutputNotAFile`] where it is no file.
+    pub(crate) fn check_replaced(&self, path: &Path) -> Result<(), Error> {
+        if let (Ok(input), Ok(output)) = (self.input.canonicalize(), path.canonicalize())
+            && input == output
+        {
+            return Err(Error::SameFile { path: path.to_owned() });
+        }
+        if path.exists() && !path.is_file() {
+            return Err(Error::OutputNotAFile { path: path.to_owned() });
         }
         Ok(())
     }
@@ -81,6 +112,10 @@ pub(crate) fn extension(path: &Path) -> String {
 fn finite(text: &str) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok();
     number.filter(|number| number.is_finite()).ok_or_else(|| "it must be a finite number".to_owned())
+}
+
+fn cells(text: &str) -> Result<NonZeroU32, String> {
+    text.trim().parse().map_err(|_| format!("it must be a whole number of cells from 1 to {}", u32::MAX))
 }
 
 fn shape(text: &str) -> Result<[u32; 3], String> {

@@ -69,6 +69,23 @@ pub(crate) enum Error {
     #[error("{} cannot be meshed: {source}", path.display())]
     Mesh { path: PathBuf, source: MeshError },
 
+    #[error(
+        "--chunk {cells} makes {chunks} chunks of this volume, but no more than {most} are written: at least {least} cells are needed"
+    )]
+    TooManyChunks { cells: u32, chunks: u128, most: u64, least: u64 },
+
+    #[error("the mesh does not fit in memory, which --chunk and --check need to hold it")]
+    MeshMemory,
+
+    #[error("a triangle has a vertex that is not at hand")]
+    VertexMissing,
+
+    #[error("the mesh is not clean; nothing has been written")]
+    NotClean,
+
+    #[error("{} is of an earlier mesh and cannot be removed: {source}", path.display())]
+    Remove { path: PathBuf, source: io::Error },
+
     #[error("{} cannot be written: {source}", path.display())]
     Write { path: PathBuf, source: OutputError },
 
@@ -77,11 +94,12 @@ pub(crate) enum Error {
 }
 
 impl Error {
-    /// 2 for bad input, 1 where the system cannot take the mesh, 130 for an interruption.
+    /// 2 for bad input, 1 where the system cannot take the mesh, 3 for a mesh with defects, 130 for an interruption.
     pub(crate) const fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted => 130,
-            Self::Memory { .. } | Self::Write { .. } => 1,
+            Self::NotClean => 3,
+            Self::Memory { .. } | Self::MeshMemory | Self::Write { .. } | Self::Remove { .. } => 1,
             _ => 2,
         }
     }

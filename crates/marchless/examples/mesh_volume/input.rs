@@ -59,15 +59,21 @@ impl Volume {
         Ok(volume)
     }
 
+    /// Samples along the axes of the file, the fastest first.
+    pub(crate) const fn lattice(&self) -> [u32; 3] {
+        let [x, y, z] = self.size;
+        if self.z_fastest { [z, y, x] } else { [x, y, z] }
+    }
+
     /// Samples along the two faster axes of the file.
     pub(crate) const fn slab(&self) -> [u32; 2] {
-        let [x, y, z] = self.size;
-        if self.z_fastest { [z, y] } else { [x, y] }
+        let [a, b, _] = self.lattice();
+        [a, b]
     }
 
     /// How many slabs there are.
     pub(crate) const fn slabs(&self) -> u32 {
-        self.size[if self.z_fastest { 0 } else { 2 }]
+        self.lattice()[2]
     }
 
     /// Reads the next slab, which fills `bytes`.

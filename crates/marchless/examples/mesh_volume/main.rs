@@ -1,22 +1,29 @@
-//! `mesh_volume`: the isosurface of a volume in a file, as a mesh in a file.
+//! `mesh_volume`: the isosurface of a volume in a file, as a mesh in a file, or in one per chunk.
 //!
 //! ```text
 //! mesh_volume head.npy --iso 300 -o head.ply
 //! mesh_volume engine.raw --shape 256,256,128 --type u8 --iso 80 --spacing 1,1,1.6 -o engine.glb
+//! mesh_volume caves.npy --chunk 64 --check -o caves.ply
 //! ```
 //!
 //! What lies below the isovalue is inside. The volume may be larger than memory: it is read, meshed and written a slab
-//! (the samples of one z) at a time.
+//! (the samples of one z) at a time. With `--chunk`, the meshes of one layer of chunks are held until it is complete;
+//! with `--check` alone, the whole mesh is, though never the volume. (So the mesh is judged by itself, as any reader
+//! would find it, not against its samples.)
 
 mod args;
 mod error;
 mod input;
 mod npy;
 mod output;
+mod recent;
 mod sample;
+mod sink;
+mod split;
 mod stream;
 mod transform;
 
+use std::fmt;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -27,8 +34,9 @@ use clap::Parser as _;
 use args::Args;
 use error::Error;
 use input::Volume;
-use output::Output;
-use stream::{Totals, stream};
+use sink::{ChunkedSink, Made, Sink, WholeSink};
+use split::Chunks;
+use stream::{Times, stream};
 use transform::Transform;
 
 fn main() -> ExitCode {
@@ -45,9 +53,33 @@ fn run(args: &Args) -> Result<(), Error> {
     args.check_files()?;
     let mut volume = Volume::open(args)?;
     let transform = Transform::new(args, &volume)?;
-    let output = Output::create(&args.output)?;
-    let totals = stream(&mut volume, args.iso, &transform, output, &Stop::on_signals())?;
-    summarise(args, &volume, &totals);
+    let chunks = args.chunk.map(|size| Chunks::new(size, &volume)).transpose()?;
+    let stop = Stop::on_signals();
+    let sink: Box<dyn Sink> = match chunks {
+        Some(chunks) => Box::new(ChunkedSink::new(args, chunks, transform)?),
+        None => Box::new(WholeSink::new(args, &volume, transform)?),
+    };
+    let (made, times) = stream(&mut volume, args, sink, &stop)?;
+    if let Some(check) = &made.check {
+        say(check);
+        if !check.is_clean() {
+            return Err(Error::NotClean);
+        }
+    }
+    stop.check()?;
+    let summary = summary(args, &volume, chunks.as_ref(), &made, times);
+    let (is_empty, foreign) = (made.triangles == 0, made.foreign.clone());
+    made.put()?;
+    say(&summary);
+    if let Some((first, count)) = foreign {
+        note(format_args!("{} is none of these chunks and left as it is (files alike: {count})", first.display()));
+    }
+    if is_empty {
+        note(format_args!(
+            "there is no surface, since no neighbouring samples lie on different sides of {:?}",
+            args.iso
+        ));
+    }
     Ok(())
 }
 
@@ -68,23 +100,28 @@ impl Stop {
     }
 }
 
-fn summarise(args: &Args, volume: &Volume, totals: &Totals) {
+/// What has been made of what, in one line.
+fn summary(args: &Args, volume: &Volume, chunks: Option<&Chunks>, made: &Made, times: Times) -> String {
     let [x, y, z] = volume.size;
-    let [reading, meshing, writing] = totals.times.map(|time| time.as_secs_f64());
-    // The mesh is whole already, whether or not anyone listens.
-    let _ = writeln!(
-        io::stdout(),
-        "{}: {x} × {y} × {z} {}, {} vertices, {} triangles; read in {reading:.2} s, meshed in {meshing:.2} s, written in {writing:.2} s",
+    let chunks = chunks.map_or_else(String::new, |chunks| {
+        format!(" in {} chunks, {} of them with a surface", chunks.count, made.files.len())
+    });
+    let [reading, meshing, writing] = [times.reading, times.meshing, times.writing].map(|time| time.as_secs_f64());
+    format!(
+        "{}: {x} × {y} × {z} {}{chunks}, {} vertices, {} triangles; read in {reading:.2} s, meshed in {meshing:.2} s, written in {writing:.2} s\n",
         args.output.display(),
         volume.sample_type,
-        totals.vertices,
-        totals.triangles,
-    );
-    if totals.triangles == 0 {
-        let _ = writeln!(
-            io::stderr(),
-            "note: there is no surface, since no neighbouring samples lie on different sides of {:?}",
-            args.iso
-        );
-    }
+        made.vertices,
+        made.triangles,
+    )
+}
+
+/// Prints to standard output. The mesh is whole already, whether or not anyone listens.
+fn say(text: impl fmt::Display) {
+    let _ = write!(io::stdout(), "{text}");
+}
+
+/// Prints to standard error what the user may want to know.
+fn note(text: impl fmt::Display) {
+    let _ = writeln!(io::stderr(), "note: {text}");
 }

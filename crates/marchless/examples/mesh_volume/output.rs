@@ -10,10 +10,12 @@ mod obj;
 mod ply;
 mod stl;
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use marchless::MeshBuffer;
+use tempfile::TempPath;
 use thiserror::Error;
 
 use crate::Stop;
@@ -40,7 +42,7 @@ impl Output {
         let encoder: Box<dyn Encoder> = match &*extension(path) {
             "ply" => Box::new(ply::Ply::default()),
             "obj" => Box::new(obj::Obj),
-            "stl" => Box::new(stl::Stl::default()),
+            "stl" => Box::new(stl::Stl::new()),
             "glb" => Box::new(glb::Glb::default()),
             _ => return Err(Error::OutputFormat { path: path.to_owned() }),
         };
@@ -60,19 +62,50 @@ impl Output {
         self.encoder.encode(piece, body, tail).map_err(|source| Error::Write { path: self.path.clone(), source })
     }
 
-    /// Completes the file and puts it in its place.
+    /// Completes the file, but does not put it in its place yet.
     ///
     /// # Errors
     /// [`Error::Write`] or [`Error::Interrupted`].
-    pub(crate) fn finish(self, stop: &Stop) -> Result<(), Error> {
+    pub(crate) fn complete(self, stop: &Stop) -> Result<Whole, Error> {
         let Self { path, draft, encoder } = self;
-        let written = match encoder.header() {
-            Ok(header) => draft.finish(&path, &header, || stop.check().is_ok()).map_err(OutputError::from),
+        let name = match encoder.header() {
+            Ok(header) => draft.finish(&header, || stop.check().is_ok()).map_err(OutputError::from),
             Err(error) => Err(error),
         };
         stop.check()?;
-        written.map_err(|source| Error::Write { path, source })
+        match name {
+            Ok(name) => Ok(Whole { path, name }),
+            Err(source) => Err(Error::Write { path, source }),
+        }
     }
+}
+
+/// A file that is whole and waits, under another name, to be put in its place.
+pub(crate) struct Whole {
+    path: PathBuf,
+    name: TempPath,
+}
+
+/// Puts files in their places, where they replace older ones.
+///
+/// # Errors
+/// [`Error::Write`] where one cannot be put there; those that did not replace any are then removed again.
+pub(crate) fn put(files: Vec<Whole>) -> Result<(), Error> {
+    let mut added = Vec::new();
+    for Whole { path, name } in files {
+        let replaces = path.exists();
+        if let Err(error) = name.persist(&path) {
+            for path in added {
+                // There is nothing left to be done for it.
+                let _ = fs::remove_file(path);
+            }
+            return Err(Error::Write { path, source: error.error.into() });
+        }
+        if !replaces {
+            added.push(path);
+        }
+    }
+    Ok(())
 }
 
 /// A format of mesh files.

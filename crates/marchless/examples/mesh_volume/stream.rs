@@ -1,42 +1,36 @@
-//! [`stream`]: slab by slab from the volume through the mesher to the output.
+//! [`stream`]: slab by slab from the volume through the mesher to where the mesh goes.
 
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use marchless::{MeshBuffer, MeshSettings, SlabMesher};
+use marchless::{MeshBuffer, MeshSettings, SlabMesher, Topology};
 
 use crate::Stop;
+use crate::args::Args;
 use crate::error::Error;
 use crate::input::Volume;
-use crate::output::Output;
 use crate::sample::{Sample, SampleType};
-use crate::transform::Transform;
+use crate::sink::{Made, Sink};
 
-/// What came of it.
+/// How long each part of it took.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Totals {
-    pub(crate) vertices: u64,
-    pub(crate) triangles: u64,
-    /// How long [`READING`], [`MESHING`] and [`WRITING`] took.
-    pub(crate) times: [Duration; 3],
+pub(crate) struct Times {
+    pub(crate) reading: Duration,
+    pub(crate) meshing: Duration,
+    pub(crate) writing: Duration,
 }
 
-const READING: usize = 0;
-const MESHING: usize = 1;
-const WRITING: usize = 2;
-
-/// Meshes the whole volume and puts the output in its place.
+/// Meshes the whole volume into `sink`.
 ///
 /// # Errors
 /// [`Error`] where the volume cannot be read to its end, the mesh cannot be named by 32-bit indices or written, or the
 /// user has enough of it.
 pub(crate) fn stream(
     volume: &mut Volume,
-    iso: f64,
-    transform: &Transform,
-    output: Output,
+    args: &Args,
+    sink: Box<dyn Sink>,
     stop: &Stop,
-) -> Result<Totals, Error> {
+) -> Result<(Made, Times), Error> {
     let run = match volume.sample_type {
         SampleType::I8 => stream_as::<i8>,
         SampleType::U8 => stream_as::<u8>,
@@ -46,76 +40,52 @@ pub(crate) fn stream(
         SampleType::F32 => stream_as::<f32>,
         SampleType::F64 => stream_as::<f64>,
     };
-    run(volume, iso, transform, output, stop)
+    run(volume, args, sink, stop)
 }
 
 fn stream_as<S: Sample>(
     volume: &mut Volume,
-    iso: f64,
-    transform: &Transform,
-    output: Output,
+    args: &Args,
+    mut sink: Box<dyn Sink>,
     stop: &Stop,
-) -> Result<Totals, Error> {
+) -> Result<(Made, Times), Error> {
     let slab = volume.slab();
     let (mut bytes, mut weights) = buffers::<S>(slab, volume.sample_type)?;
-    let settings = MeshSettings { isovalue: S::isovalue(iso), ..MeshSettings::default() };
+    let topology = if args.exact { Topology::Trilinear } else { Topology::Separated };
+    let settings = MeshSettings { isovalue: S::isovalue(args.iso), topology, ..MeshSettings::default() };
     let mut mesher = SlabMesher::new(slab, settings).map_err(|source| volume.error(source))?;
     let mut mesh = MeshBuffer::new();
-    let mut sink = Sink { transform, output, stop, totals: Totals::default(), since: Instant::now() };
+    let (mut times, mut since) = (Times::default(), Instant::now());
 
     let progress = progress_bar(volume.slabs());
-    for _ in 0..volume.slabs() {
+    for slab in 0..volume.slabs() {
         volume.read(&mut bytes)?;
         weights.clear();
-        S::decode(&bytes, iso, &mut weights);
-        sink.spent(READING);
+        S::decode(&bytes, args.iso, &mut weights);
+        spend(&mut since, &mut times.reading);
         mesher.push(&weights, &mut mesh).map_err(|source| volume.error(source))?;
-        sink.take(&mut mesh)?;
+        spend(&mut since, &mut times.meshing);
+        // The mesher waits for the next slab before it makes anything of one.
+        if let Some(made) = slab.checked_sub(1) {
+            sink.take(made, &mut mesh, stop)?;
+        }
+        spend(&mut since, &mut times.writing);
         progress.inc(1);
     }
     mesher.finish(&mut mesh).map_err(|source| volume.error(source))?;
-    sink.take(&mut mesh)?;
-    let totals = sink.finish()?;
+    spend(&mut since, &mut times.meshing);
+    sink.take(volume.slabs() - 1, &mut mesh, stop)?;
+    let made = sink.finish(stop)?;
+    spend(&mut since, &mut times.writing);
     progress.finish_and_clear();
-    Ok(totals)
+    Ok((made, times))
 }
 
-/// Where pieces of the mesh go, and what is counted on the way.
-struct Sink<'a> {
-    transform: &'a Transform,
-    output: Output,
-    stop: &'a Stop,
-    totals: Totals,
-    /// Up to when time has been accounted for.
-    since: Instant,
-}
-
-impl Sink<'_> {
-    /// Takes a piece out of `mesh`.
-    fn take(&mut self, mesh: &mut MeshBuffer) -> Result<(), Error> {
-        self.transform.apply(mesh);
-        self.spent(MESHING);
-        self.totals.vertices += mesh.positions.len() as u64;
-        self.totals.triangles += mesh.triangle_count() as u64;
-        self.output.append(mesh)?;
-        mesh.clear();
-        self.spent(WRITING);
-        self.stop.check()
-    }
-
-    fn finish(self) -> Result<Totals, Error> {
-        let Self { output, stop, mut totals, since, .. } = self;
-        output.finish(stop)?;
-        totals.times[WRITING] += since.elapsed();
-        Ok(totals)
-    }
-
-    /// Counts the time that has passed since the last call as `part`.
-    fn spent(&mut self, part: usize) {
-        let now = Instant::now();
-        self.totals.times[part] += now - self.since;
-        self.since = now;
-    }
+/// Counts the time that has passed since the last call as `part`.
+fn spend(since: &mut Instant, part: &mut Duration) {
+    let now = Instant::now();
+    *part += now - *since;
+    *since = now;
 }
 
 /// Room for a slab as bytes and as weights.

@@ -34,8 +34,7 @@ impl Transform {
     /// Moves a piece of the mesh.
     pub(crate) fn apply(&self, mesh: &mut MeshBuffer) {
         for position in &mut mesh.positions {
-            let lattice = self.ordered(*position);
-            *position = [0, 1, 2].map(|axis| (f64::from(lattice[axis]) * self.spacing[axis]) as f32);
+            *position = self.position(*position);
         }
         for normal in &mut mesh.normals {
             *normal = self.normal(self.ordered(*normal));
@@ -46,6 +45,16 @@ impl Transform {
                 triangle.swap(1, 2);
             }
         }
+    }
+
+    /// Where samples of the file's lattice are; to the last bit the coordinates that vertices beside them have.
+    pub(crate) fn corners(&self, samples: [[u32; 3]; 2]) -> [[f32; 3]; 2] {
+        samples.map(|sample| self.position(sample.map(|v| v as f32)))
+    }
+
+    fn position(&self, lattice: [f32; 3]) -> [f32; 3] {
+        let lattice = self.ordered(lattice);
+        [0, 1, 2].map(|axis| (f64::from(lattice[axis]) * self.spacing[axis]) as f32)
     }
 
     /// The vector in the order x, y, z.

@@ -57,6 +57,19 @@ impl Folder {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
+    /// Runs the example, which must succeed, but have something to note.
+    #[track_caller]
+    pub(crate) fn mesh_noting(&self, args: &str) -> String {
+        let output = self.run(args);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            output.status.success() && errors.starts_with("note: "),
+            "{args} ended with {}:\n{errors}",
+            output.status
+        );
+        errors
+    }
+
     /// Runs the example, which must refuse with one sentence that has all of `because` in it, and leave all files as
     /// they were.
     #[track_caller]

@@ -44,9 +44,9 @@ impl Draft {
         (&mut self.body, &mut self.tail)
     }
 
-    /// Joins both parts, puts the header before them and the file in its place, where it replaces an older one.
-    /// Where `go_on` no longer holds, it is [`io::ErrorKind::Interrupted`].
-    pub(super) fn finish(mut self, path: &Path, header: &[u8], go_on: impl Fn() -> bool) -> io::Result<()> {
+    /// Joins both parts and puts the header before them; what is returned is the whole file's name until it is in its
+    /// place. Where `go_on` no longer holds, it is [`io::ErrorKind::Interrupted`].
+    pub(super) fn finish(mut self, header: &[u8], go_on: impl Fn() -> bool) -> io::Result<TempPath> {
         self.body.flush()?;
         self.tail.flush()?;
         let (file, tail) = (self.body.get_mut(), self.tail.get_mut());
@@ -60,9 +60,6 @@ impl Draft {
         file.write_all(header)?;
         // Some file systems say only now that they are full.
         file.sync_all()?;
-        if !go_on() {
-            return Err(io::ErrorKind::Interrupted.into());
-        }
-        self.name.persist(path).map_err(|error| error.error)
+        Ok(self.name)
     }
 }

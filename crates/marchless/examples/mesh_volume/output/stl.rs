@@ -1,27 +1,17 @@
 //! Binary STL: triangles that share nothing, each with a normal of its own.
 
-use std::collections::VecDeque;
-use std::io::Write;
+use std::io::{self, Write};
 
 use marchless::MeshBuffer;
 
 use super::{Encoder, OutputError, bytes};
+use crate::recent::Recent;
 
 /// Must not begin with "solid", as text files do.
 const TITLE: &[u8] = b"binary STL made by mesh_volume";
 
-/// A piece is what a slab adds: triangles between it and the slab before it, which have no other vertices than the two
-/// slabs.
-const PIECES: usize = 2;
-
-#[derive(Default)]
 pub(super) struct Stl {
-    /// The latest vertices.
-    recent: VecDeque<[f32; 3]>,
-    /// How many came before those.
-    gone: usize,
-    /// How many there were before each of the latest pieces.
-    pieces: VecDeque<usize>,
+    recent: Recent<[f32; 3]>,
     triangles: u64,
 }
 
@@ -31,16 +21,9 @@ impl Encoder for Stl {
     }
 
     fn encode(&mut self, piece: &MeshBuffer, body: &mut dyn Write, _tail: &mut dyn Write) -> Result<(), OutputError> {
-        self.pieces.push_back(self.gone + self.recent.len());
-        if self.pieces.len() > PIECES
-            && let Some(first) = self.pieces.pop_front()
-        {
-            self.recent.drain(..first - self.gone);
-            self.gone = first;
-        }
-        self.recent.extend(&piece.positions);
+        self.recent.extend(piece.positions.iter().copied()).map_err(io::Error::from)?;
         for triangle in piece.triangles() {
-            let corners = triangle.map(|index| self.vertex(index));
+            let corners = triangle.map(|index| self.recent.get(index));
             let [Some(a), Some(b), Some(c)] = corners else {
                 return Err(OutputError::VertexMissing { triangle: self.triangles });
             };
@@ -61,8 +44,8 @@ impl Encoder for Stl {
 }
 
 impl Stl {
-    fn vertex(&self, index: u32) -> Option<[f32; 3]> {
-        self.recent.get((index as usize).checked_sub(self.gone)?).copied()
+    pub(super) const fn new() -> Self {
+        Self { recent: Recent::new(), triangles: 0 }
     }
 
     fn count(&self) -> Result<u32, OutputError> {

@@ -1,0 +1,109 @@
+//! What is sound in the meshes of marchless and of its peers, and what is not: everyone meshes the same 304 small fields
+//! of 19 kinds, with ties, NaN and all magnitudes among them ([`fields`]), as their documentation says ([`peers`]), and
+//! [`MeshReport`](marchless::MeshReport) judges the meshes.
+//!
+//! `cargo bench -p marchless_benches --bench soundness` prints the tables in a minute or so; with `MARCHLESS_RECORD=1` in the
+//! environment they are also written to `record/soundness.md`. It fails if a mesh of ours is not clean.
+//! `--write DIR` after `--` only writes the fields to `DIR/fields`, one file each: samples as little-endian `f32`, x
+//! fastest. `--judge DIR` judges the meshes in `DIR/meshes` too, a folder for each extractor, a file for each field
+//! ([`Mesh::read`]). `benches/peers/soundness.py` does both for extractors that Python packages offer.
+
+mod fields;
+mod mesh;
+mod peers;
+mod record;
+mod tally;
+
+use std::{
+    env, fs, io, panic,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use fields::Field;
+use mesh::Mesh;
+use peers::Peer;
+use tally::Tally;
+
+/// Fields of each kind.
+const PER_KIND: usize = 16;
+/// The most samples per axis.
+const LARGEST: usize = 33;
+
+fn main() -> ExitCode {
+    run().unwrap_or_else(|error| {
+        eprintln!("soundness: {error}");
+        ExitCode::FAILURE
+    })
+}
+
+fn run() -> io::Result<ExitCode> {
+    // As criterion decides: without `--bench`, it is `cargo test` that calls.
+    if !env::args().any(|argument| argument == "--bench") {
+        return Ok(finish(judge_all(&fields::all(1, 16), None)?.1));
+    }
+    let fields = fields::all(PER_KIND, LARGEST);
+    if let Some(folder) = path_after("--write") {
+        write(&fields, &folder.join("fields"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (tallies, unclean) = judge_all(&fields, path_after("--judge").as_deref())?;
+    record::report(&fields, &tallies)?;
+    Ok(finish(unclean))
+}
+
+/// The argument that follows `flag`.
+fn path_after(flag: &str) -> Option<PathBuf> {
+    env::args_os().skip_while(|argument| argument != flag).nth(1).map(PathBuf::from)
+}
+
+fn write(fields: &[Field], folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    for field in fields {
+        let bytes: Vec<u8> = field.samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        fs::write(folder.join(field.file_name() + ".f32"), bytes)?;
+    }
+    Ok(())
+}
+
+/// Everyone's tallies, and what is wrong with meshes of ours. `folder`: where there are meshes that others made.
+fn judge_all(fields: &[Field], folder: Option<&Path>) -> io::Result<(Vec<Tally>, Vec<String>)> {
+    let (mut tallies, mut unclean) = (Vec::new(), Vec::new());
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| ())); // peers' panics are counted, and nothing else
+    for (index, peer) in Peer::ALL.into_iter().enumerate() {
+        let mut tally = Tally::new(peer.name);
+        for field in fields {
+            let verdict = tally.judge(field, peer.mesh(field).as_ref());
+            if let (Err(flaws), true) = (verdict, index < Peer::OURS) {
+                unclean.push(format!("{}, {}: {flaws}", peer.name, field.file_name()));
+            }
+        }
+        tallies.push(tally);
+    }
+    panic::set_hook(hook);
+    for extractor in folder.map_or_else(|| Ok(Vec::new()), |folder| folders(&folder.join("meshes")))? {
+        let mut tally = Tally::new(extractor.file_name().unwrap_or_default().to_string_lossy());
+        for field in fields {
+            // What is wrong with it is in the tally.
+            let _ = tally.judge(field, Mesh::read(&extractor.join(field.file_name() + ".mesh"))?.as_ref());
+        }
+        tallies.push(tally);
+    }
+    Ok((tallies, unclean))
+}
+
+/// The folders in a folder, by name.
+fn folders(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut folders = fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+    folders.sort();
+    Ok(folders)
+}
+
+/// Tells what is wrong with ours.
+fn finish(unclean: Vec<String>) -> ExitCode {
+    for mesh in &unclean {
+        eprintln!("not clean: {mesh}");
+    }
+    if unclean.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}

@@ -1,0 +1,22 @@
+//! Tables for reports.
+
+/// A Markdown table whose columns are as wide as need be; the first row is its head, and all rows are as long.
+pub fn aligned(rows: &[impl AsRef<[String]>]) -> String {
+    let columns = rows.first().map_or(0, |row| row.as_ref().len());
+    let width = |column: usize| rows.iter().map(|row| row.as_ref()[column].chars().count()).max().unwrap_or(0).max(3);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut table = String::new();
+    for (index, row) in rows.iter().enumerate() {
+        for (cell, &width) in row.as_ref().iter().zip(&widths) {
+            table += &format!("| {cell}{} ", " ".repeat(width - cell.chars().count()));
+        }
+        table += "|\n";
+        if index == 0 {
+            for width in &widths {
+                table += &format!("|{}", "-".repeat(width + 2));
+            }
+            table += "|\n";
+        }
+    }
+    table
+}

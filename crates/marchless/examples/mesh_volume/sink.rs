@@ -1,0 +1,91 @@
+//! [`Sink`]: where the mesh goes while it is made.
+
+mod chunked;
+mod series;
+mod whole;
+
+use std::path::PathBuf;
+use std::{fmt, fs};
+
+use marchless::{MeshBuffer, MeshReport};
+
+use crate::Stop;
+use crate::error::Error;
+use crate::output::{self, Whole};
+pub(crate) use chunked::ChunkedSink;
+pub(crate) use whole::WholeSink;
+
+/// Where the mesh goes, piece by piece.
+pub(crate) trait Sink {
+    /// Takes what slab `slab` has added to the mesh out of `piece`.
+    ///
+    /// # Errors
+    /// [`Error`] where it cannot be written or held in memory, or the user has enough of it.
+    fn take(&mut self, slab: u32, piece: &mut MeshBuffer, stop: &Stop) -> Result<(), Error>;
+
+    /// Completes all files.
+    ///
+    /// # Errors
+    /// As [`take`](Self::take).
+    fn finish(self: Box<Self>, stop: &Stop) -> Result<Made, Error>;
+}
+
+/// What has been made: files that are whole, but not in their places yet.
+pub(crate) struct Made {
+    pub(crate) files: Vec<Whole>,
+    /// Files of an earlier mesh, in the place of which there is nothing now.
+    pub(crate) stale: Vec<PathBuf>,
+    pub(crate) vertices: u64,
+    pub(crate) triangles: u64,
+    /// Files that are numbered, too, but are no chunks of this mesh: the first and how many.
+    pub(crate) foreign: Option<(PathBuf, usize)>,
+    /// What `--check` has found, where it was wanted.
+    pub(crate) check: Option<Check>,
+}
+
+impl Made {
+    /// Puts all files in their places and removes those of an earlier mesh.
+    ///
+    /// # Errors
+    /// [`Error::Write`], and nothing has been added, [`Error::Remove`].
+    pub(crate) fn put(self) -> Result<(), Error> {
+        output::put(self.files)?;
+        for path in self.stale {
+            fs::remove_file(&path).map_err(|source| Error::Remove { path, source })?;
+        }
+        Ok(())
+    }
+}
+
+/// What `--check` has found.
+#[derive(Default)]
+pub(crate) struct Check {
+    /// How many meshes it has looked at, where those that are clean are not listed.
+    pub(crate) meshes: Option<u64>,
+    /// Which meshes, and what it has found.
+    pub(crate) reports: Vec<(PathBuf, MeshReport)>,
+}
+
+impl Check {
+    pub(crate) fn is_clean(&self) -> bool {
+        self.reports.iter().all(|(_, report)| report.is_clean())
+    }
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (path, report) in &self.reports {
+            writeln!(f, "{}: {report}", path.display())?;
+        }
+        match (self.meshes, self.reports.len()) {
+            (None, _) => Ok(()),
+            (Some(meshes), 0) => writeln!(f, "meshes checked: {meshes}, all clean"),
+            (Some(meshes), defective) => writeln!(f, "meshes checked: {meshes}, with defects: {defective}"),
+        }
+    }
+}
+
+/// Examines a mesh that may be open where it leaves the box `[min, max]`.
+fn examine(mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> MeshReport {
+    MeshReport::in_box(&mesh.positions, &mesh.indices, bounds)
+}
