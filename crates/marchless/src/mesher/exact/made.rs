@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use super::{
     Open,
-    tunnel::{RING, Waist, ring, spaced, straightened, strip},
+    tunnel::{RING, Strip, Waist, ring, spaced, straightened, strip},
 };
 use crate::{
     buffer::MeshBuffer,
@@ -41,8 +41,10 @@ impl<W: Weight> Open<'_, W> {
         };
         let tunnel = waist.and_then(|waist| Tunnel::new(self.case, &loops, &field, waist));
         if let Some(tunnel) = &tunnel {
-            let names = tunnel.ring.map(&mut vertex);
-            tunnel.join(&loops, &crossings, names, triangles);
+            for corner in tunnel.ring {
+                vertex(corner);
+            }
+            triangles.extend(tunnel.strips.iter().flat_map(Strip::triangles));
         }
         for number in (0..loops.count).filter(|number| tunnel.as_ref().is_none_or(|t| !t.loops.contains(number))) {
             let around = loops.get(number);
@@ -114,6 +116,15 @@ impl Trilinear {
         between(low, high, z)
     }
 
+    /// Where the interpolant is 0 on an edge, whose ends differ in sign.
+    fn crossing(&self, edge: Edge) -> [f64; 3] {
+        let [low, high] = edge.corners();
+        let (a, b) = (self.0[low.index()], self.0[high.index()]);
+        let mut crossing = low.offset().map(f64::from);
+        crossing[edge.axis()] = a / (a - b);
+        crossing
+    }
+
     fn gradient(&self, at: [f64; 3]) -> [f64; 3] {
         core::array::from_fn(|axis| {
             let [mut low, mut high] = [at; 2];
@@ -153,56 +164,63 @@ impl Trilinear {
 /// Two loops whose sheets are one, and the ring between them.
 struct Tunnel {
     loops: [usize; 2],
-    waist: Waist,
     /// Where the ring's corners are, in order.
     ring: [[f64; 3]; RING],
+    /// The strips between the loops and the ring, whose corners are the first vertices in the interior.
+    strips: [Strip; 2],
 }
 
 impl Tunnel {
-    /// `None` where it cannot be told which loops are joined.
+    /// `None` where it cannot be told what is to be joined.
     fn new(case: CaseIndex, loops: &Loops, field: &Trilinear, waist: Waist) -> Option<Self> {
-        let waist = spaced(waist);
-        let corner = |corner: usize| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
+        let corner = |corner: usize, waist: &Waist| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
         // On the ring the interpolant is about 0. What the tunnel goes around is farthest from that.
-        let through = |end: usize| field.at(corner(end)) + field.at(corner(end ^ 7));
+        let through = |end: usize| field.at(corner(end, &waist)) + field.at(corner(end ^ 7, &waist));
         let end = (0..4).max_by(|&a, &b| through(a).abs().total_cmp(&through(b).abs()))?;
-        let goes_around_inside = through(end) < 0.0;
-        let joined = match loops.count {
-            2 => [0, 1],
-            _ => {
-                // The tunnel leads to the corner that one of the small sheets cuts off: not to one of the other sign.
-                let is_cut_off = |number: usize| {
-                    let ends = |edge: &Edge| edge.corners().iter().fold(0, |ends, corner| ends | 1u8 << corner.index());
-                    let cut_off = loops.get(number).iter().fold(u8::MAX, |common, edge| common & ends(edge));
-                    cut_off != 0 && (cut_off & case.0 != 0) == goes_around_inside
-                };
-                let large = (0..loops.count).find(|&number| loops.get(number).len() > 3)?;
-                [large, (0..loops.count).find(|&number| is_cut_off(number))?]
-            }
-        };
-        Some(Self { loops: joined, waist, ring: ring(end).map(corner) })
-    }
+        let joined = joined_loops(case, loops, through(end) < 0.0)?;
 
-    /// Appends the triangles on both sides of the ring, whose corners have these names.
-    fn join(&self, loops: &Loops, crossings: &[[f64; 3]; 12], names: [u8; RING], triangles: &mut Vec<[u8; 3]>) {
-        let straight = |point| straightened(point, &self.waist);
-        let forward = (self.ring.map(straight), names);
-        let mut backward = forward;
-        backward.0.reverse();
-        backward.1.reverse();
-        let strip_to = |number: usize, ring: &([[f64; 3]; RING], [u8; RING])| {
+        let corners = ring(end).map(|end| straightened(corner(end, &waist), &waist));
+        let names = core::array::from_fn(|index| FIRST_INTERIOR + index as u8);
+        let (mut corners_backward, mut names_backward): ([[f64; 3]; RING], [u8; RING]) = (corners, names);
+        corners_backward.reverse();
+        names_backward.reverse();
+        let strip_to = |number: usize, forward: bool| {
             let (mut around, mut around_names) = ([[0.0; 3]; 12], [0; 12]);
             let edges = loops.get(number);
-            for (index, edge) in edges.iter().enumerate() {
-                (around[index], around_names[index]) = (straight(crossings[edge.index()]), edge.index() as u8);
+            for (index, &edge) in edges.iter().enumerate() {
+                (around[index], around_names[index]) = (straightened(field.crossing(edge), &waist), edge.index() as u8);
             }
-            strip((&around[..edges.len()], &ring.0), (&around_names[..edges.len()], &ring.1))
+            let ring = if forward { (&corners, &names) } else { (&corners_backward, &names_backward) };
+            strip((&around[..edges.len()], ring.0), (&around_names[..edges.len()], ring.1))
         };
         // One loop turns as the ring does, and the other against it.
-        let [(a, b), (c, d)] = [[&forward, &backward], [&backward, &forward]]
-            .map(|[first, second]| (strip_to(self.loops[0], first), strip_to(self.loops[1], second)));
-        let [first, second] = if a.0 + b.0 <= c.0 + d.0 { [a.1, b.1] } else { [c.1, d.1] };
-        triangles.extend_from_slice(first.triangles());
-        triangles.extend_from_slice(second.triangles());
+        let pair = |forward: bool| strip_to(joined[0], forward).zip(strip_to(joined[1], !forward));
+        let ((_, first), (_, second)) = match (pair(true), pair(false)) {
+            (Some(one), Some(other)) => {
+                if one.0.0 + one.1.0 <= other.0.0 + other.1.0 {
+                    one
+                } else {
+                    other
+                }
+            }
+            (one, other) => one.or(other)?,
+        };
+        let waist = spaced(waist);
+        Some(Self { loops: joined, ring: ring(end).map(|end| corner(end, &waist)), strips: [first, second] })
     }
+}
+
+/// The two loops that a tunnel joins. `goes_around_inside`: what is within the tunnel.
+fn joined_loops(case: CaseIndex, loops: &Loops, goes_around_inside: bool) -> Option<[usize; 2]> {
+    if loops.count == 2 {
+        return Some([0, 1]);
+    }
+    // The tunnel leads to the corner that one of the small sheets cuts off: not to one of the other sign.
+    let leads_to = |number: &usize| {
+        let ends = |edge: &Edge| edge.corners().iter().fold(0, |ends, corner| ends | 1u8 << corner.index());
+        let cut_off = loops.get(*number).iter().fold(u8::MAX, |common, edge| common & ends(edge));
+        cut_off != 0 && (cut_off & case.0 != 0) == goes_around_inside
+    };
+    let large = (0..loops.count).find(|&number| loops.get(number).len() > 3)?;
+    Some([large, (0..loops.count).find(leads_to)?])
 }
