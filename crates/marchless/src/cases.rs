@@ -66,55 +66,98 @@ struct Cases {
 }
 
 impl Cases {
-    /// Joins the crossings face by face, follows them into loops, and cuts each loop into a fan.
     const fn derive(&mut self, case: CaseIndex) {
-        let next = joined_crossings(case);
-        let (mut seen, mut start) = ([false; 12], 0);
+        let Some((count, triangles)) = triangulate(&Loops::new(case, 0)) else {
+            panic!("where inside corners are separated, every loop has a fan");
+        };
+        self.counts[case.0 as usize] = count;
+        self.triangles[case.0 as usize] = triangles;
+    }
+}
+
+/// The triangles of these loops as fans around crossings: at most 5, of which the first so many count. `None` where
+/// there are more, or where some loop has no fan.
+pub(crate) const fn triangulate(loops: &Loops) -> Option<(u8, [[Edge; 3]; 5])> {
+    let (mut count, mut triangles, mut number) = (0, [[Edge::ALL[0]; 3]; 5], 0);
+    while number < loops.count {
+        let crossings = loops.get(number);
+        let Some(apex) = fan_apex(crossings) else { return None };
+        let (len, mut corner) = (crossings.len(), 1);
+        while corner + 1 < len {
+            if count == 5 {
+                return None;
+            }
+            triangles[count] =
+                [crossings[apex], crossings[(apex + corner) % len], crossings[(apex + corner + 1) % len]];
+            count += 1;
+            corner += 1;
+        }
+        number += 1;
+    }
+    Some((count as u8, triangles))
+}
+
+/// The loops that the surface's segments on the faces of a cell close into.
+#[derive(Clone, Copy)]
+pub(crate) struct Loops {
+    /// One loop behind the other, each with the inside to its left as seen from outside the cell.
+    crossings: [Edge; 12],
+    /// Where each loop ends.
+    ends: [usize; 4],
+    pub(crate) count: usize,
+}
+
+impl Loops {
+    /// Joins the crossings face by face and follows them. `joined`: a bit for each face on which inside corners that
+    /// stand diagonally are joined instead of separated; of faces that are not ambiguous, it means nothing.
+    pub(crate) const fn new(case: CaseIndex, joined: u8) -> Self {
+        let next = next_crossings(case, joined);
+        let mut loops = Self { crossings: [Edge::ALL[0]; 12], ends: [0; 4], count: 0 };
+        let (mut seen, mut len, mut start) = ([false; 12], 0, 0);
         while start < 12 {
             if next[start].is_some() && !seen[start] {
-                let (mut crossings, mut len, mut at) = ([Edge::ALL[0]; 12], 0, start);
+                let mut at = start;
                 while !seen[at] {
                     seen[at] = true;
-                    crossings[len] = Edge::ALL[at];
+                    loops.crossings[len] = Edge::ALL[at];
                     len += 1;
                     at = match next[at] {
                         Some(edge) => edge.index(),
                         None => panic!("a loop is closed"),
                     };
                 }
-                self.add_fan(case, &crossings, len);
+                loops.ends[loops.count] = len;
+                loops.count += 1;
             }
             start += 1;
         }
+        loops
     }
 
-    const fn add_fan(&mut self, case: CaseIndex, crossings: &[Edge; 12], len: usize) {
-        let apex = fan_apex(crossings, len);
-        let mut corner = 1;
-        while corner + 1 < len {
-            let count = &mut self.counts[case.0 as usize];
-            self.triangles[case.0 as usize][*count as usize] =
-                [crossings[apex], crossings[(apex + corner) % len], crossings[(apex + corner + 1) % len]];
-            *count += 1;
-            corner += 1;
-        }
+    /// The crossings of loop `number`, in order.
+    pub(crate) const fn get(&self, number: usize) -> &[Edge] {
+        let start = if number == 0 { 0 } else { self.ends[number - 1] };
+        let (until_end, _) = self.crossings.split_at(self.ends[number]);
+        let (_, crossings) = until_end.split_at(start);
+        crossings
     }
 }
 
-/// For each crossed edge, the one that follows it on a loop that keeps the inside to its left as seen from outside.
-const fn joined_crossings(case: CaseIndex) -> [Option<Edge>; 12] {
+/// For each crossed edge, the one that follows it on a loop.
+const fn next_crossings(case: CaseIndex, joined: u8) -> [Option<Edge>; 12] {
     let (mut next, mut face) = ([None; 12], 0);
     while face < 6 {
         let corners = Face::ALL[face].corners();
+        let outside_is_cut_off = case.is_ambiguous(Face::ALL[face]) && joined >> face & 1 == 1;
         let mut start = 0;
         while start < 4 {
             // A run of inside corners begins behind an outside one, and ends before the next.
             if !case.is_inside(corners[start]) && case.is_inside(corners[(start + 1) % 4]) {
-                let mut end = (start + 1) % 4;
+                let entry = Edge::between(corners[start], corners[(start + 1) % 4]);
+                let mut end = if outside_is_cut_off { (start + 3) % 4 } else { (start + 1) % 4 };
                 while case.is_inside(corners[(end + 1) % 4]) {
                     end = (end + 1) % 4;
                 }
-                let entry = Edge::between(corners[start], corners[(start + 1) % 4]);
                 next[entry.index()] = Some(Edge::between(corners[end], corners[(end + 1) % 4]));
             }
             start += 1;
@@ -124,9 +167,9 @@ const fn joined_crossings(case: CaseIndex) -> [Option<Edge>; 12] {
     next
 }
 
-/// The first crossing of the loop whose fan has no diagonal in a face of the cell.
-const fn fan_apex(crossings: &[Edge; 12], len: usize) -> usize {
-    let mut apex = 0;
+/// The first crossing of the loop whose fan has no diagonal in a face of the cell, if there is one.
+pub(crate) const fn fan_apex(crossings: &[Edge]) -> Option<usize> {
+    let (len, mut apex) = (crossings.len(), 0);
     while apex < len {
         let (mut clear, mut step) = (true, 2);
         while step + 1 < len {
@@ -134,11 +177,11 @@ const fn fan_apex(crossings: &[Edge; 12], len: usize) -> usize {
             step += 1;
         }
         if clear {
-            return apex;
+            return Some(apex);
         }
         apex += 1;
     }
-    panic!("every loop has such a fan")
+    None
 }
 
 #[cfg(test)]

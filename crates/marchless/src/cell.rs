@@ -179,6 +179,15 @@ impl CaseIndex {
         self.is_inside(low) != self.is_inside(high)
     }
 
+    /// Whether the corners of `face` alternate between inside and outside, so that their signs alone do not tell how its
+    /// four crossings are joined.
+    pub const fn is_ambiguous(self, face: Face) -> bool {
+        let [a, b, c, d] = face.corners();
+        self.is_inside(a) == self.is_inside(c)
+            && self.is_inside(b) == self.is_inside(d)
+            && self.is_inside(a) != self.is_inside(b)
+    }
+
     /// The triangles of this case, each corner named by the edge that it lies on.
     pub const fn triangles(self) -> &'static [[Edge; 3]] {
         let (used, _) =

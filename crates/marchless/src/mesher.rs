@@ -19,6 +19,7 @@
 //! counters that run through a whole slab in the place of offsets per row.
 
 mod classify;
+mod exact;
 mod output;
 mod slabs;
 mod stream;

@@ -152,7 +152,7 @@ pub trait Simd {
 }
 
 /// Codes of cells; a power of two, so that a masked code needs no check.
-pub(crate) const CODES: usize = 512;
+pub(crate) const CODES: usize = 1024;
 
 /// What a cell of some code adds to the mesh, in half a cache line. See `mesher/triangles.rs`, which derives them.
 #[derive(Clone, Copy)]

@@ -10,7 +10,7 @@ use std::num::NonZero;
 use fields::{Field, TestWeight};
 #[cfg(feature = "std")]
 use marchless::ThreadedMesher;
-use marchless::{Backend, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher};
+use marchless::{Backend, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher, Topology};
 use proptest::prelude::*;
 
 /// A mesh down to the last bit, signs of zeros and all.
@@ -67,8 +67,10 @@ fn streamed<W: TestWeight>(samples: Samples<'_, W>, settings: &MeshSettings, tak
     bits(&whole)
 }
 
-fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> Result<(), TestCaseError> {
-    let settings = MeshSettings { isovalue: field.isovalue, normals, ..MeshSettings::default() };
+/// `exact`: whether open cells are decided.
+fn check<W: TestWeight>(field: &Field<W>, normals: bool, exact: bool, taken_every: usize) -> Result<(), TestCaseError> {
+    let topology = if exact { Topology::Trilinear } else { Topology::Separated };
+    let settings = MeshSettings { isovalue: field.isovalue, normals, topology };
     let portable = meshed(Mesher::with_backend(Backend::Portable), field.samples(), &settings);
     for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
         let mesh = meshed(Mesher::with_backend(backend), field.samples(), &settings);
@@ -93,18 +95,18 @@ fn check<W: TestWeight>(field: &Field<W>, normals: bool, taken_every: usize) -> 
 
 proptest! {
     #[test]
-    fn fields_of_i8_are_the_same(field in Field::<i8>::any(), normals: bool, taken_every in 1usize..9) {
-        check(&field, normals, taken_every)?;
+    fn fields_of_i8_are_the_same(field in Field::<i8>::any(), normals: bool, exact: bool, taken_every in 1usize..9) {
+        check(&field, normals, exact, taken_every)?;
     }
 
     #[test]
-    fn fields_of_i16_are_the_same(field in Field::<i16>::any(), normals: bool, taken_every in 1usize..9) {
-        check(&field, normals, taken_every)?;
+    fn fields_of_i16_are_the_same(field in Field::<i16>::any(), normals: bool, exact: bool, taken_every in 1usize..9) {
+        check(&field, normals, exact, taken_every)?;
     }
 
     #[test]
-    fn fields_of_f32_are_the_same(field in Field::<f32>::any(), normals: bool, taken_every in 1usize..9) {
-        check(&field, normals, taken_every)?;
+    fn fields_of_f32_are_the_same(field in Field::<f32>::any(), normals: bool, exact: bool, taken_every in 1usize..9) {
+        check(&field, normals, exact, taken_every)?;
     }
 }
 
@@ -113,14 +115,16 @@ proptest! {
 #[test]
 fn all_pairs_of_cases_are_the_same() {
     let shape = Shape::new([3, 2, 2]).expect("the size is small");
-    let settings = MeshSettings::default();
     for signs in 0..1u32 << 12 {
         let weights: Vec<f32> =
             (0..12).map(|index| if signs >> index & 1 == 1 { -1.0 } else { 0.5 + index as f32 }).collect();
         let samples = Samples::new(shape, &weights).expect("one weight a sample");
-        let portable = meshed(Mesher::with_backend(Backend::Portable), samples, &settings);
-        for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
-            assert_eq!(meshed(Mesher::with_backend(backend), samples, &settings), portable, "{}", backend.name());
+        for topology in [Topology::Separated, Topology::Trilinear] {
+            let settings = MeshSettings { topology, ..MeshSettings::default() };
+            let portable = meshed(Mesher::with_backend(Backend::Portable), samples, &settings);
+            for backend in Backend::ALL.iter().copied().filter(|backend| backend.is_available()) {
+                assert_eq!(meshed(Mesher::with_backend(backend), samples, &settings), portable, "{}", backend.name());
+            }
         }
     }
 }

@@ -11,21 +11,28 @@ use alloc::vec::Vec;
 
 use super::{
     classify::Signs,
+    exact::{Change, EXTRA_CODES, Exact, extra_case, extra_triangles},
     output::{keep, room},
     slabs::Lattice,
     vertices::filled,
 };
 use crate::{
     cases::{CROSSED_EDGES, TRIANGLE_COUNTS, TRIANGLES},
+    cell::Edge,
     simd::{CODES, Recipe, Simd},
 };
 
 /// Codes of cells are their cases; behind these come those that close a row.
 const CLOSING: u16 = 256;
+/// Behind these come those of cases whose faces were decided otherwise.
+pub(super) const FIRST_EXTRA: u16 = 512;
 
 /// Codes that are gathered before they become triangles: enough to make the loop over them long, few enough to stay in
 /// the first cache.
 const GATHERED: usize = 256;
+
+/// Words that are looked at together.
+pub(super) const WORDS: usize = 64;
 
 /// The first vertices of two neighbouring slabs on their edges along x and y, and on those along z between them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,6 +49,7 @@ pub(super) fn join<S: Simd>(
     low: &Signs,
     high: &Signs,
     first: &FirstVertices,
+    exact: &Exact,
     indices: &mut Vec<u32>,
 ) {
     let words = lattice.words;
@@ -58,15 +66,13 @@ pub(super) fn join<S: Simd>(
     ];
     let last_bit = lattice.last_word ^ lattice.last_word >> 1;
     let (mut codes, mut gathered) = ([0u16; GATHERED + 64], 0);
-    let mut active = [0; 64];
+    let mut active = [0; WORDS];
+    let mut decided = exact.cells().iter();
+    let mut next_decided = decided.next();
     let cells = words * (lattice.size[1] - 1);
-    for start in (0..cells).step_by(64) {
-        let count = (cells - start).min(64);
-        // The eight corners of the cells, one word each.
-        let [a, c] = of_rows(low.signs(), start, count, words);
-        let [b, d] = of_rows(low.next(), start, count, words);
-        let [e, g] = of_rows(high.signs(), start, count, words);
-        let [f, h] = of_rows(high.next(), start, count, words);
+    for start in (0..cells).step_by(WORDS) {
+        let count = (cells - start).min(WORDS);
+        let [a, b, c, d, e, f, g, h] = corner_words(low, high, start, count, words);
         for i in 0..count {
             let any = a[i] | b[i] | c[i] | d[i] | e[i] | f[i] | g[i] | h[i];
             let all = a[i] & b[i] & c[i] & d[i] & e[i] & f[i] & g[i] & h[i];
@@ -78,9 +84,26 @@ pub(super) fn join<S: Simd>(
             nonzero &= nonzero - 1;
             let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
             let room = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
-            gathered += S::cases(corners, active[i % 64], room);
+            let (first_code, mut flushed) = (gathered, 0);
+            gathered += S::cases(corners, active[i % WORDS], room);
             let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
-            codes[gathered - 1] += if ends_row && active[i % 64] & last_bit != 0 { CLOSING } else { 0 };
+            codes[gathered - 1] += if ends_row && active[i % WORDS] & last_bit != 0 { CLOSING } else { 0 };
+            while let Some(cell) = next_decided.filter(|cell| cell.word == start + i) {
+                next_decided = decided.next();
+                let cells_before = active[i % WORDS] & ((1 << cell.bit) - 1);
+                let at = first_code + cells_before.count_ones() as usize - flushed;
+                match cell.change {
+                    Change::Code(code) => codes[at] = code,
+                    Change::Made { first_interior, triangles } => {
+                        flush::<S>(&codes[..at], &mut counters, indices);
+                        let case = usize::from(codes[at]);
+                        add(case, exact.triangles(triangles), first_interior, &mut counters, indices);
+                        codes.copy_within(at + 1..gathered, 0);
+                        gathered -= at + 1;
+                        flushed += at + 1;
+                    }
+                }
+            }
             if gathered >= GATHERED {
                 flush::<S>(&codes[..gathered], &mut counters, indices);
                 gathered = 0;
@@ -88,6 +111,22 @@ pub(super) fn join<S: Simd>(
         }
     }
     flush::<S>(&codes[..gathered], &mut counters, indices);
+}
+
+/// The signs of the eight corners of cells, a word each for `count` words of cells from `start` on.
+#[inline(always)]
+pub(super) fn corner_words<'a>(
+    low: &'a Signs,
+    high: &'a Signs,
+    start: usize,
+    count: usize,
+    words: usize,
+) -> [&'a [u64]; 8] {
+    let [a, c] = of_rows(low.signs(), start, count, words);
+    let [b, d] = of_rows(low.next(), start, count, words);
+    let [e, g] = of_rows(high.signs(), start, count, words);
+    let [f, h] = of_rows(high.next(), start, count, words);
+    [a, b, c, d, e, f, g, h]
 }
 
 /// The words from `start` on of a row and of the next one.
@@ -112,30 +151,54 @@ fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>
     }
 }
 
+/// Writes the triangles of a cell that was made, and takes the counters past it.
+#[cold]
+#[inline(never)]
+fn add(case: usize, triangles: &[[u8; 3]], first_interior: u32, counters: &mut [u32; 8], indices: &mut Vec<u32>) {
+    indices.extend(triangles.iter().flatten().map(|&corner| match usize::from(corner).checked_sub(12) {
+        Some(interior) => first_interior.wrapping_add(interior as u32),
+        None => {
+            let vertex = vertex(case, corner.into());
+            counters[usize::from(vertex % 8)].wrapping_add(u32::from(vertex >> 4))
+        }
+    }));
+    for (counter, step) in counters.iter_mut().zip(RECIPES[case].steps) {
+        *counter = counter.wrapping_add(step.into());
+    }
+}
+
+/// Which counter an edge's vertex has in a case, as in [`Recipe::vertices`].
+const fn vertex(case: usize, edge: usize) -> u8 {
+    if edge < 4 {
+        return edge as u8;
+    }
+    let (low, high) = (edge & !1, edge & 1);
+    ((4 + (low - 4) / 2) | high << 3 | (high & (CROSSED_EDGES[case] >> low & 1) as usize) << 4) as u8
+}
+
+/// The recipe of a cell with these triangles, the first `count` of which count.
+const fn recipe(case: usize, count: u8, triangles: &[[Edge; 3]; 5]) -> Recipe {
+    let mut recipe = Recipe { vertices: [0; 16], steps: [0; 8], count: 3 * count };
+    let mut index = 0;
+    while index < 15 {
+        recipe.vertices[index] = vertex(case, triangles[index / 3][index % 3].index());
+        index += 1;
+    }
+    let mut lane = 0;
+    while lane < 4 {
+        recipe.steps[lane] = (CROSSED_EDGES[case] >> lane & 1) as u8;
+        recipe.steps[4 + lane] = (CROSSED_EDGES[case] >> (4 + 2 * lane) & 1) as u8;
+        lane += 1;
+    }
+    recipe
+}
+
 /// What each code adds to the mesh.
 static RECIPES: [Recipe; CODES] = {
     let mut rows = [Recipe { vertices: [0; 16], steps: [0; 8], count: 0 }; CODES];
     let mut case = 0;
     while case < 256 {
-        let crossed = CROSSED_EDGES[case];
-        let mut index = 0;
-        while index < 15 {
-            let edge = TRIANGLES[case][index / 3][index % 3].index();
-            rows[case].vertices[index] = if edge < 4 {
-                edge as u8
-            } else {
-                let (low, high) = (edge & !1, edge & 1);
-                ((4 + (low - 4) / 2) | high << 3 | (high & (crossed >> low & 1) as usize) << 4) as u8
-            };
-            index += 1;
-        }
-        let mut lane = 0;
-        while lane < 4 {
-            rows[case].steps[lane] = (crossed >> lane & 1) as u8;
-            rows[case].steps[4 + lane] = (crossed >> (4 + 2 * lane) & 1) as u8;
-            lane += 1;
-        }
-        rows[case].count = 3 * TRIANGLE_COUNTS[case];
+        rows[case] = recipe(case, TRIANGLE_COUNTS[case], &TRIANGLES[case]);
         case += 1;
     }
     let mut case = 0;
@@ -143,6 +206,12 @@ static RECIPES: [Recipe; CODES] = {
         let [a, b, c, d] = [case & 1, case >> 2 & 1, case >> 4 & 1, case >> 6 & 1];
         rows[CLOSING as usize + case].steps = [0, 0, 0, 0, (a ^ b) as u8, (c ^ d) as u8, (a ^ c) as u8, (b ^ d) as u8];
         case += 1;
+    }
+    let mut number = 0;
+    while number < EXTRA_CODES {
+        let (count, triangles) = extra_triangles(number);
+        rows[FIRST_EXTRA as usize + number] = recipe(extra_case(number).0 as usize, count, &triangles);
+        number += 1;
     }
     rows
 };

@@ -31,7 +31,7 @@ use crate::{
 };
 
 /// Crossings stay this far from the ends of their edge.
-const MARGIN: f32 = 1.0 / 1024.0;
+pub(super) const MARGIN: f32 = 1.0 / 1024.0;
 
 /// Crossings that are gathered before they become vertices.
 const GATHERED: usize = 128;

@@ -1,0 +1,150 @@
+//! Where two sheets of the trilinear interpolant's surface are joined in the interior of a cell, and the triangles of
+//! the tunnel between them.
+//!
+//! In a slice of the cell across an axis the interpolant is bilinear, and `q(t) = A(t)·C(t) − B(t)·D(t)` of the slice's
+//! corners, a parabola, is zero where its saddle lies on the surface: there, the surface's curves in the slice are two
+//! lines that cross. Two sheets are joined in the interior just where q has two different roots within the cell along
+//! each of the three axes. (On 22 million random cells with several sheets, that was so without an exception when the
+//! regions of each cell were joined slice by slice.) The six roots are the sides of a box; six of its corners, all but
+//! those at the ends of one diagonal, lie on the surface, and so do the sides between them: a ring around the tunnel's
+//! waist.
+//!
+//! Two roots may be as close as floating point allows. The ring's corners are kept apart and away from the faces, and
+//! since its sides run along the axes, none can be in line with a crossing on an edge: no triangle has zero area.
+
+use super::super::vertices::MARGIN;
+
+/// The box around a tunnel's waist: from and to, per axis, in the cell's coordinates.
+pub(super) type Waist = [[f64; 2]; 3];
+
+/// Corners of the ring around a waist.
+pub(super) const RING: usize = 6;
+
+/// The waist of the tunnel between the sheets of a cell with these weights at its corners, where there are several
+/// sheets and two are joined.
+pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
+    let mut waist = [[0.0; 2]; 3];
+    for (axis, ends) in waist.iter_mut().enumerate() {
+        let [u, v] = [1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3)];
+        let [low, high] = [0, 1 << axis].map(|side| [0, u, u | v, v].map(|corner| weights[corner | side]));
+        let slope: [f64; 4] = core::array::from_fn(|corner| high[corner] - low[corner]);
+        let a = slope[0] * slope[2] - slope[1] * slope[3];
+        let b = low[0] * slope[2] + low[2] * slope[0] - low[1] * slope[3] - low[3] * slope[1];
+        let c = low[0] * low[2] - low[1] * low[3];
+        *ends = roots_within(a, b, c)?;
+    }
+    Some(waist)
+}
+
+/// The two roots of `a·t² + b·t + c`, where both lie between 0 and 1 and are not the same.
+fn roots_within(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+    let discriminant = b * b - 4.0 * a * c;
+    // NaN makes every comparison false.
+    let on_one_side = a * c > 0.0 && a * (a + b + c) > 0.0;
+    let turns_within = a * b < 0.0 && b.abs() < 2.0 * a.abs();
+    if !(discriminant > 0.0 && discriminant < f64::INFINITY && on_one_side && turns_within) {
+        return None;
+    }
+    let larger = -0.5 * (b + crate::math::sqrt_f64(discriminant).copysign(b));
+    let (first, second) = (c / larger, larger / a);
+    Some([first.min(second), first.max(second)])
+}
+
+/// The waist with its ends apart from each other and from the faces of the cell.
+pub(super) fn spaced(waist: Waist) -> Waist {
+    let least = f64::from(MARGIN);
+    waist.map(|[from, to]| {
+        let middle = (0.5 * (from + to)).clamp(2.0 * least, 1.0 - 2.0 * least);
+        [from.clamp(least, middle - least), to.clamp(middle + least, 1.0 - least)]
+    })
+}
+
+/// The ring's corners in order, as corners of the box. `end`: the corner at an end of the diagonal that it goes around.
+pub(super) const fn ring(end: usize) -> [usize; RING] {
+    [end ^ 1, end ^ 3, end ^ 2, end ^ 6, end ^ 4, end ^ 5]
+}
+
+/// Where a point of the cell would be if the waist filled the middle third of the cell. What has to be joined with
+/// what depends on the order of things along the axes alone, and is plain to see there however thin the waist is.
+pub(super) fn straightened(point: [f64; 3], waist: &Waist) -> [f64; 3] {
+    core::array::from_fn(|axis| {
+        let ([from, to], at) = (waist[axis], point[axis]);
+        let thirds = if at < from {
+            at / from
+        } else if at <= to {
+            1.0 + (at - from) / (to - from)
+        } else {
+            2.0 + (at - to) / (1.0 - to)
+        };
+        thirds / 3.0
+    })
+}
+
+/// Joins a loop of crossings to the ring, both given in the same sense of rotation: the triangles between them with the
+/// least sum of squared lengths of the lines from one to the other, and that sum. Corners get these names. `None` where
+/// all of the ring would have to hang on one crossing, so that a line would be there twice.
+pub(super) fn strip(
+    (around, ring): (&[[f64; 3]], &[[f64; 3]; RING]),
+    (around_names, ring_names): (&[u8], &[u8; RING]),
+) -> Option<(f64, Strip)> {
+    let len = around.len();
+    let mut best: Option<(f64, Strip)> = None;
+    for start in 0..RING {
+        // The least sum up to corner `i` of the loop and `j` of the ring, and whether the last step was the loop's.
+        let (mut sums, mut along) = ([[f64::INFINITY; RING + 1]; 13], [[false; RING + 1]; 13]);
+        for i in 0..=len {
+            for j in 0..=RING {
+                let after_loop = if i > 0 { sums[i - 1][j] } else { f64::INFINITY };
+                let after_ring = if j > 0 { sums[i][j - 1] } else { f64::INFINITY };
+                let before = if i + j == 0 { 0.0 } else { after_loop.min(after_ring) };
+                sums[i][j] = before + squared_distance(around[i % len], ring[(start + j) % RING]);
+                along[i][j] = j == 0 || i > 0 && after_loop <= after_ring;
+            }
+        }
+        if best.as_ref().is_some_and(|(sum, _)| *sum <= sums[len][RING]) {
+            continue;
+        }
+        let mut strip = Strip { triangles: [[0; 3]; 12 + RING], count: 0 };
+        // The crossings that the ring hangs on, a bit each.
+        let mut held_by = 0u16;
+        let (mut i, mut j) = (len, RING);
+        while i + j > 0 {
+            let (outer, inner) = (around_names[i % len], ring_names[(start + j) % RING]);
+            if along[i][j] {
+                i -= 1;
+                strip.push([around_names[i], outer, inner]);
+            } else {
+                j -= 1;
+                held_by |= 1 << (i % len);
+                strip.push([inner, ring_names[(start + j) % RING], outer]);
+            }
+        }
+        if held_by.count_ones() > 1 {
+            best = Some((sums[len][RING], strip));
+        }
+    }
+    best
+}
+
+/// The triangles between a loop and a ring.
+#[derive(Clone, Copy)]
+pub(super) struct Strip {
+    triangles: [[u8; 3]; 12 + RING],
+    count: usize,
+}
+
+impl Strip {
+    fn push(&mut self, triangle: [u8; 3]) {
+        self.triangles[self.count] = triangle;
+        self.count += 1;
+    }
+
+    pub(super) fn triangles(&self) -> &[[u8; 3]] {
+        &self.triangles[..self.count]
+    }
+}
+
+fn squared_distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [x, y, z] = core::array::from_fn(|axis| a[axis] - b[axis]);
+    x * x + y * y + z * z
+}
