@@ -20,6 +20,9 @@ pub(super) type Waist = [[f64; 2]; 3];
 /// Corners of the ring around a waist.
 pub(super) const RING: usize = 6;
 
+/// Waists closer to a face of the cell are left out: floating point does not tell on which side of the crossings they are.
+const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// The waist of the tunnel between the sheets of a cell with these weights at its corners, where there are several
 /// sheets and two are joined.
 pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
@@ -47,7 +50,8 @@ fn roots_within(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     }
     let larger = -0.5 * (b + crate::math::sqrt_f64(discriminant).copysign(b));
     let (first, second) = (c / larger, larger / a);
-    Some([first.min(second), first.max(second)])
+    let (from, to) = (first.min(second), first.max(second));
+    (from > LEAST_ROOM && to < 1.0 - LEAST_ROOM).then_some([from, to])
 }
 
 /// The waist with its ends apart from each other and from the faces of the cell.
