@@ -184,6 +184,24 @@ fn ten_million_patterns_of_2_by_2_by_2_cells_are_sound() {
     assert_eq!(meshes, 20_000_000);
 }
 
+/// With the long report, which looks for triangles that cross each other in space.
+#[test]
+fn the_triangles_of_a_cell_never_cross() {
+    let mut bench = Bench::new(24);
+    for inside in 0..256 {
+        for number in 0..500 {
+            let small = SmallBox { size: [2; 3], inside };
+            bench.fill(small, VALUES[number % VALUES.len()]);
+            for topology in TOPOLOGIES {
+                bench.mesh(small, topology);
+                let report = bench.report(small);
+                let (weights, mesh) = (&bench.weights[..8], &bench.mesh);
+                assert!(report.is_clean(), "{topology:?}, {weights:?}: {report} in {mesh:?}");
+            }
+        }
+    }
+}
+
 /// Spoils a mesh in one of many ways.
 fn spoil(mesh: &mut MeshBuffer, random: &mut Random) {
     let mut any = |len: usize| random.below(len as u64) as usize;

@@ -8,7 +8,7 @@ pub(crate) const DEFAULT: [f32; 8] = [-1.0, 0.1, 0.3, 0.3, 0.3, 0.1, 0.1, -1.0];
 ///
 /// Each keeps its topology over some change of the isovalue; tunnels are narrow.
 pub(crate) const PRESETS: [(&str, &str, [f32; 8]); 28] = [
-    ("1", "a single corner inside", [-0.6, 0.5, 0.5, 0.8, 0.5, 0.8, 0.8, 1.0]),
+    ("1", "a single corner inside", [0.8, 1.0, 0.5, 0.8, 0.5, 0.8, -0.6, 0.5]),
     ("3.1", "an ambiguous face, inside corners separated", [-0.5, 0.8, 1.0, -0.3, 0.5, 0.5, 0.5, 0.3]),
     ("3.2", "an ambiguous face, inside corners joined", [-1.0, 0.5, 0.5, -1.0, 0.6, 0.6, 0.5, 0.3]),
     ("4.1.1", "opposite corners, apart", [-1.0, 0.5, 1.0, 1.0, 0.8, 0.4, 0.5, -1.0]),
