@@ -92,6 +92,11 @@ impl Exact {
         &self.cells
     }
 
+    /// The word of the cell with this number, or a number that no word has.
+    pub(super) fn word_of(&self, number: usize) -> usize {
+        self.cells.get(number).map_or(usize::MAX, |cell| cell.word)
+    }
+
     /// The triangles of a cell that was made. Corners are named by the edge that they lie on, 0–11, and behind these by
     /// the vertex in the cell's interior.
     pub(super) fn triangles(&self, [start, count]: [u32; 2]) -> &[[u8; 3]] {

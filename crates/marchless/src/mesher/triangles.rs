@@ -8,6 +8,7 @@
 //! no cell's low side. It is the case of a cell whose high side repeats these samples, moved up.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use super::{
     classify::Signs,
@@ -48,27 +49,27 @@ pub(super) fn join<S: Simd>(
     lattice: &Lattice,
     low: &Signs,
     high: &Signs,
-    first: &FirstVertices,
+    first_vertices: &FirstVertices,
     exact: &Exact,
     indices: &mut Vec<u32>,
 ) {
     let words = lattice.words;
     let row = |signs: &[u64], next: &[u64]| crossings(&signs[..words], &next[..words]) as u32;
     let mut counters = [
-        first.x[0],
-        first.x[0].wrapping_add(row(low.signs(), low.next())),
-        first.x[1],
-        first.x[1].wrapping_add(row(high.signs(), high.next())),
-        first.y[0],
-        first.y[1],
-        first.z,
-        first.z.wrapping_add(row(low.signs(), high.signs())),
+        first_vertices.x[0],
+        first_vertices.x[0].wrapping_add(row(low.signs(), low.next())),
+        first_vertices.x[1],
+        first_vertices.x[1].wrapping_add(row(high.signs(), high.next())),
+        first_vertices.y[0],
+        first_vertices.y[1],
+        first_vertices.z,
+        first_vertices.z.wrapping_add(row(low.signs(), high.signs())),
     ];
     let last_bit = lattice.last_word ^ lattice.last_word >> 1;
     let (mut codes, mut gathered) = ([0u16; GATHERED + 64], 0);
     let mut active = [0; WORDS];
-    let mut decided = exact.cells().iter();
-    let mut next_decided = decided.next();
+    // The first cell that was decided and not reached, and its word.
+    let (mut decided, mut next_decided) = (0, exact.word_of(0));
     let cells = words * (lattice.size[1] - 1);
     for start in (0..cells).step_by(WORDS) {
         let count = (cells - start).min(WORDS);
@@ -84,25 +85,14 @@ pub(super) fn join<S: Simd>(
             nonzero &= nonzero - 1;
             let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
             let room = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
-            let (first_code, mut flushed) = (gathered, 0);
+            let first = gathered;
             gathered += S::cases(corners, active[i % WORDS], room);
             let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
             codes[gathered - 1] += if ends_row && active[i % WORDS] & last_bit != 0 { CLOSING } else { 0 };
-            while let Some(cell) = next_decided.filter(|cell| cell.word == start + i) {
-                next_decided = decided.next();
-                let cells_before = active[i % WORDS] & ((1 << cell.bit) - 1);
-                let at = first_code + cells_before.count_ones() as usize - flushed;
-                match cell.change {
-                    Change::Code(code) => codes[at] = code,
-                    Change::Made { first_interior, triangles } => {
-                        flush::<S>(&codes[..at], &mut counters, indices);
-                        let case = usize::from(codes[at]);
-                        add(case, exact.triangles(triangles), first_interior, &mut counters, indices);
-                        codes.copy_within(at + 1..gathered, 0);
-                        gathered -= at + 1;
-                        flushed += at + 1;
-                    }
-                }
+            if start + i == next_decided {
+                (gathered, decided) =
+                    splice::<S>(exact, decided, active[i % WORDS], &mut codes, first..gathered, &mut counters, indices);
+                next_decided = exact.word_of(decided);
             }
             if gathered >= GATHERED {
                 flush::<S>(&codes[..gathered], &mut counters, indices);
@@ -151,9 +141,41 @@ fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>
     }
 }
 
-/// Writes the triangles of a cell that was made, and takes the counters past it.
+/// Puts in what was decided for cells of one word, from the one with number `decided` on. `of_word`: where the codes of
+/// the word's cells, those in `active`, are. Returns how many codes are
+/// left, and the first cell that is none of the word's.
 #[cold]
 #[inline(never)]
+fn splice<S: Simd>(
+    exact: &Exact,
+    mut decided: usize,
+    active: u64,
+    codes: &mut [u16],
+    mut of_word: Range<usize>,
+    counters: &mut [u32; 8],
+    indices: &mut Vec<u32>,
+) -> (usize, usize) {
+    let (word, mut flushed) = (exact.word_of(decided), 0);
+    while exact.word_of(decided) == word {
+        let cell = &exact.cells()[decided];
+        let cells_before = (active & ((1 << cell.bit) - 1)).count_ones() as usize;
+        let at = of_word.start + cells_before - flushed;
+        match cell.change {
+            Change::Code(code) => codes[at] = code,
+            Change::Made { first_interior, triangles } => {
+                flush::<S>(&codes[..at], counters, indices);
+                add(usize::from(codes[at]), exact.triangles(triangles), first_interior, counters, indices);
+                codes.copy_within(at + 1..of_word.end, 0);
+                of_word.end -= at + 1;
+                flushed += at + 1;
+            }
+        }
+        decided += 1;
+    }
+    (of_word.end, decided)
+}
+
+/// Writes the triangles of a cell that was made, and takes the counters past it.
 fn add(case: usize, triangles: &[[u8; 3]], first_interior: u32, counters: &mut [u32; 8], indices: &mut Vec<u32>) {
     indices.extend(triangles.iter().flatten().map(|&corner| match usize::from(corner).checked_sub(12) {
         Some(interior) => first_interior.wrapping_add(interior as u32),
