@@ -7,7 +7,7 @@
 //! the environment, they fail, lest nobody judges any more.
 //!
 //! Four fields of 35³ and 64³ `i16` samples, padding included, with normals, on the portable and the AVX2 backend, each
-//! forced, into warm buffers. The fields are sampled before valgrind starts, since noise under valgrind takes long;
+//! forced, in both topologies, into warm buffers. The fields are sampled before valgrind starts, since noise under valgrind takes long;
 //! what starts under it is this program again, told to mesh one file. Valgrind knows no AVX-512.
 
 use core::{fmt, hint::black_box};
@@ -19,12 +19,14 @@ use std::{
     process::{Command, ExitCode},
 };
 
-use marchless::{Backend, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless::{Backend, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 use marchless_benches::Field;
 
 const FIELDS: [Field; 4] = [Field::Sphere, Field::Terrain, Field::Caves, Field::WhiteNoise];
 const SIZES: [u32; 2] = [35, 64];
 const BACKENDS: [Backend; 2] = [Backend::Portable, Backend::Avx2];
+/// What the names of their rows end with.
+const TOPOLOGIES: [&str; 2] = ["", " trilinear"];
 /// How many times the baseline a count may be.
 const ALLOWED: f64 = 1.03;
 const RENEW: &str = "cargo run --release -p marchless_benches --bin instructions -- --renew";
@@ -35,7 +37,8 @@ fn main() -> ExitCode {
     let done = match *arguments {
         [] => judge(),
         ["--renew"] => renew(),
-        ["mesh", file, size, backend] => mesh(Path::new(file), size, backend),
+        ["mesh", file, size, backend] => mesh(Path::new(file), size, backend, Topology::Separated),
+        ["mesh", file, size, backend, "trilinear"] => mesh(Path::new(file), size, backend, Topology::Trilinear),
         _ => Err("expected no arguments, or `--renew`".into()),
     };
     match done {
@@ -57,12 +60,12 @@ fn judge() -> Result<(), Box<dyn Error>> {
     let mut failures = Vec::new();
     for (what, count) in &counts.of {
         let Some(before) = baseline.of.iter().find_map(|(other, before)| (other == what).then_some(*before)) else {
-            println!("{what:30} {count:>12}, no baseline");
+            println!("{what:34} {count:>12}, no baseline");
             failures.push(format!("{what} has no baseline"));
             continue;
         };
         let change = (*count as f64 / before as f64 - 1.0) * 100.0;
-        println!("{what:30} {count:>12}, baseline {before:>12}: {change:+.2} %");
+        println!("{what:34} {count:>12}, baseline {before:>12}: {change:+.2} %");
         if *count as f64 > before as f64 * ALLOWED {
             failures.push(format!("{what} takes {change:.2} % more instructions"));
         }
@@ -139,11 +142,11 @@ impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "# Instructions of meshing once, as callgrind counts them: field, samples per axis, backend, count."
+            "# Instructions of meshing once, as callgrind counts them: field, samples per axis, backend, topology, count."
         )?;
         writeln!(f, "# Written by `{RENEW}` with")?;
         writeln!(f, "# {}", self.compiler)?;
-        self.of.iter().try_for_each(|(what, count)| writeln!(f, "{what:24} {count}"))
+        self.of.iter().try_for_each(|(what, count)| writeln!(f, "{what:34} {count}"))
     }
 }
 
@@ -156,12 +159,14 @@ fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
             let weights = field.distances(size).into_iter().map(i16::from_voxels);
             fs::write(&file, weights.flat_map(i16::to_le_bytes).collect::<Vec<_>>())?;
             for backend in BACKENDS {
-                if backend.is_available() {
-                    let what = format!("{name} {size} {}", backend.name());
-                    let count = count(&file, size, backend).map_err(|error| format!("{what}: {error}"))?;
-                    counts.push((what, count));
-                } else {
+                if !backend.is_available() {
                     println!("{name} {size} {}: skipped, this machine has no such instructions", backend.name());
+                    continue;
+                }
+                for topology in TOPOLOGIES {
+                    let what = format!("{name} {size} {}{topology}", backend.name());
+                    let count = count(&file, size, backend, topology).map_err(|error| format!("{what}: {error}"))?;
+                    counts.push((what, count));
                 }
             }
         }
@@ -170,10 +175,11 @@ fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
 }
 
 /// Runs this program under callgrind, on one file.
-fn count(file: &Path, size: u32, backend: Backend) -> Result<u64, Box<dyn Error>> {
+fn count(file: &Path, size: u32, backend: Backend, topology: &str) -> Result<u64, Box<dyn Error>> {
     let mut command = Command::new("valgrind");
     command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*mesh_and_count*"]);
     command.arg(env::current_exe()?).arg("mesh").arg(file).args([&size.to_string(), backend.name()]);
+    command.args(topology.split_whitespace());
     let output = command.output().map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => "valgrind is not installed".to_owned(),
         _ => format!("valgrind does not start: {error}"),
@@ -188,7 +194,7 @@ fn count(file: &Path, size: u32, backend: Backend) -> Result<u64, Box<dyn Error>
 }
 
 /// What runs under callgrind: meshes a file twice, to be counted the second time.
-fn mesh(file: &Path, size: &str, backend: &str) -> Result<(), Box<dyn Error>> {
+fn mesh(file: &Path, size: &str, backend: &str, topology: Topology) -> Result<(), Box<dyn Error>> {
     let bytes = fs::read(file)?;
     let weights: Vec<i16> = bytes.as_chunks().0.iter().map(|&chunk| i16::from_le_bytes(chunk)).collect();
     let samples = Samples::new(Shape::cube(size.parse()?)?, &weights)?.padded();
@@ -196,7 +202,8 @@ fn mesh(file: &Path, size: &str, backend: &str) -> Result<(), Box<dyn Error>> {
     if !backend.is_available() {
         return Err("valgrind hides the instructions of this backend".into());
     }
-    let (mut mesher, mut mesh, settings) = (Mesher::with_backend(backend), MeshBuffer::new(), MeshSettings::default());
+    let (mut mesher, mut mesh, settings) =
+        (Mesher::with_backend(backend), MeshBuffer::new(), MeshSettings { topology, ..MeshSettings::default() });
     mesher.mesh(samples, &settings, &mut mesh)?;
     mesh_and_count(&mut mesher, black_box(samples), &settings, &mut mesh);
     if black_box(&mesh).indices.is_empty() { Err("there is no surface".into()) } else { Ok(()) }

@@ -20,6 +20,9 @@ pub(super) type Waist = [[f64; 2]; 3];
 /// Corners of the ring around a waist.
 pub(super) const RING: usize = 6;
 
+/// Crossings of a cell, and so of a loop, at most.
+const MOST: usize = 12;
+
 /// Waists closer to a face of the cell are left out: floating point does not tell on which side of the crossings they are.
 const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
 
@@ -85,55 +88,49 @@ pub(super) fn straightened(point: [f64; 3], waist: &Waist) -> [f64; 3] {
 }
 
 /// Joins a loop of crossings to the ring, both given in the same sense of rotation: the triangles between them with the
-/// least sum of squared lengths of the lines from one to the other, and that sum. Corners get these names. `None` where
-/// all of the ring would have to hang on one crossing, so that a line would be there twice.
+/// least sum of squared lengths of the lines from one to the other, among those that join the first crossing to the
+/// nearest corner of the ring, and that sum. Corners get these names. `None` where all of the ring would hang on one
+/// crossing, so that a line would be there twice.
 pub(super) fn strip(
     (around, ring): (&[[f64; 3]], &[[f64; 3]; RING]),
     (around_names, ring_names): (&[u8], &[u8; RING]),
 ) -> Option<(f64, Strip)> {
     let len = around.len();
-    let mut best: Option<(f64, Strip)> = None;
-    for start in 0..RING {
-        // The least sum up to corner `i` of the loop and `j` of the ring, and whether the last step was the loop's.
-        let (mut sums, mut along) = ([[f64::INFINITY; RING + 1]; 13], [[false; RING + 1]; 13]);
-        for i in 0..=len {
-            for j in 0..=RING {
-                let after_loop = if i > 0 { sums[i - 1][j] } else { f64::INFINITY };
-                let after_ring = if j > 0 { sums[i][j - 1] } else { f64::INFINITY };
-                let before = if i + j == 0 { 0.0 } else { after_loop.min(after_ring) };
-                sums[i][j] = before + squared_distance(around[i % len], ring[(start + j) % RING]);
-                along[i][j] = j == 0 || i > 0 && after_loop <= after_ring;
-            }
-        }
-        if best.as_ref().is_some_and(|(sum, _)| *sum <= sums[len][RING]) {
-            continue;
-        }
-        let mut strip = Strip { triangles: [[0; 3]; 12 + RING], count: 0 };
-        // The crossings that the ring hangs on, a bit each.
-        let mut held_by = 0u16;
-        let (mut i, mut j) = (len, RING);
-        while i + j > 0 {
-            let (outer, inner) = (around_names[i % len], ring_names[(start + j) % RING]);
-            if along[i][j] {
-                i -= 1;
-                strip.push([around_names[i], outer, inner]);
-            } else {
-                j -= 1;
-                held_by |= 1 << (i % len);
-                strip.push([inner, ring_names[(start + j) % RING], outer]);
-            }
-        }
-        if held_by.count_ones() > 1 {
-            best = Some((sums[len][RING], strip));
+    let distance = |i: usize, j: usize| squared_distance(around[i % len], ring[j % RING]);
+    let start = (0..RING).min_by(|&a, &b| distance(0, a).total_cmp(&distance(0, b)))?;
+    // The least sum up to corner `i` of the loop and `j` of the ring, and whether the last step was the loop's.
+    let (mut sums, mut along) = ([[f64::INFINITY; RING + 1]; MOST + 1], [[false; RING + 1]; MOST + 1]);
+    for i in 0..=len {
+        for j in 0..=RING {
+            let after_loop = if i > 0 { sums[i - 1][j] } else { f64::INFINITY };
+            let after_ring = if j > 0 { sums[i][j - 1] } else { f64::INFINITY };
+            let before = if i + j == 0 { 0.0 } else { after_loop.min(after_ring) };
+            sums[i][j] = before + distance(i, start + j);
+            along[i][j] = j == 0 || i > 0 && after_loop <= after_ring;
         }
     }
-    best
+    let mut strip = Strip { triangles: [[0; 3]; MOST + RING], count: 0 };
+    // The crossings that the ring hangs on, a bit each.
+    let mut held_by = 0u16;
+    let (mut i, mut j) = (len, RING);
+    while i + j > 0 {
+        let (outer, inner) = (around_names[i % len], ring_names[(start + j) % RING]);
+        if along[i][j] {
+            i -= 1;
+            strip.push([around_names[i], outer, inner]);
+        } else {
+            j -= 1;
+            held_by |= 1 << (i % len);
+            strip.push([inner, ring_names[(start + j) % RING], outer]);
+        }
+    }
+    (held_by.count_ones() > 1).then_some((sums[len][RING], strip))
 }
 
 /// The triangles between a loop and a ring.
 #[derive(Clone, Copy)]
 pub(super) struct Strip {
-    triangles: [[u8; 3]; 12 + RING],
+    triangles: [[u8; 3]; MOST + RING],
     count: usize,
 }
 
