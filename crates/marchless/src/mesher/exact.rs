@@ -161,23 +161,18 @@ impl Exact {
         let open = Open::new(lattice, planes, settings, x + bit, y);
         let (joined, outcome) = open.decide_faces();
         let waist = if outcome.may_have_tunnel() { tunnel::waist(&open.weights) } else { None };
-        let change = if waist.is_some() || outcome.is_made() {
-            let start = self.triangles.len() as u32;
-            let vertices = open.make(joined, waist, &mut self.triangles, bounds, out);
-            let triangles = [start, self.triangles.len() as u32 - start];
-            self.cells.push(ExactCell {
-                word,
-                bit,
-                change: Change::Made { first_interior: first_vertex as u32, triangles },
-            });
-            return vertices;
-        } else {
-            Change::Code(outcome.code())
-        };
-        if outcome.code() != u16::from(open.case.0) {
-            self.cells.push(ExactCell { word, bit, change });
+        if waist.is_none() && !outcome.is_made() {
+            if outcome.code() != u16::from(open.case.0) {
+                self.cells.push(ExactCell { word, bit, change: Change::Code(outcome.code()) });
+            }
+            return 0;
         }
-        0
+        let start = self.triangles.len() as u32;
+        let vertices = open.make(joined, waist, &mut self.triangles, bounds, out);
+        let triangles = [start, self.triangles.len() as u32 - start];
+        let change = Change::Made { first_interior: first_vertex as u32, triangles };
+        self.cells.push(ExactCell { word, bit, change });
+        vertices
     }
 }
 
@@ -195,11 +190,16 @@ const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
 
 impl<'a, W: Weight> Open<'a, W> {
     fn new(lattice: &'a Lattice, planes: &'a Planes<'a, W>, settings: &'a MeshSettings, x: u32, y: u32) -> Self {
-        let (at, isovalue) = (lattice.index(x, y), f64::from(settings.isovalue));
-        let (mut weights, mut case) = ([0.0; 8], 0);
+        let at = lattice.index(x, y);
+        let pair = |corner: usize| {
+            let row = &planes.slabs[1 + corner / 4][at + corner / 2 % 2 * lattice.stride..][..2];
+            [row[0], row[1]].map(W::to_voxels)
+        };
+        let ([a, b], [c, d], [e, f], [g, h]) = (pair(0), pair(2), pair(4), pair(6));
+        let mut weights = [a, b, c, d, e, f, g, h].map(f64::from);
+        let mut case = 0;
         for (corner, weight) in weights.iter_mut().enumerate() {
-            let slab = planes.slabs[1 + corner / 4];
-            *weight = f64::from(slab[at + corner % 2 + corner / 2 % 2 * lattice.stride].to_voxels()) - isovalue;
+            *weight -= f64::from(settings.isovalue);
             case |= u8::from(*weight < 0.0) << corner;
         }
         Self { lattice, planes, settings, x, y, case: CaseIndex(case), weights }

@@ -23,6 +23,8 @@ const LEAST_DEPTH: f64 = 1.0 / 16.0;
 
 impl<W: Weight> Open<'_, W> {
     /// Makes the cell's vertices in its interior and appends the cell's triangles. Returns how many vertices there are.
+    #[cold]
+    #[inline(never)]
     pub(super) fn make(
         &self,
         joined: u8,
