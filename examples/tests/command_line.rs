@@ -1,5 +1,5 @@
-//! What sculpt and ambiguous_cells say and return: bad input gets one clear sentence and code 2, sculpt's headless run makes
-//! a mesh without defects, and ambiguous_cells prints its figures.
+//! What `sculpt` and `ambiguous_cells` say and return: bad input gets one clear sentence and code 2, `sculpt`'s headless
+//! run makes a mesh without defects, and `ambiguous_cells` prints its figures.
 
 mod common;
 
