@@ -72,7 +72,8 @@ fn run(args: &Args) -> Result<(), Error> {
     made.put()?;
     say(&summary);
     if let Some((first, count)) = foreign {
-        note(format_args!("{} is none of these chunks and left as it is (files alike: {count})", first.display()));
+        let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+        note(format_args!("no chunk of this mesh, and so left as it was: {}{more}", first.display()));
     }
     if is_empty {
         note(format_args!(

@@ -86,6 +86,12 @@ impl fmt::Display for Check {
 }
 
 /// Examines a mesh that may be open where it leaves the box `[min, max]`.
-fn examine(mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> MeshReport {
-    MeshReport::in_box(&mesh.positions, &mesh.indices, bounds)
+///
+/// # Errors
+/// [`Error::MeshMemory`].
+fn examine(mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> Result<MeshReport, Error> {
+    // It would end the program, and leave files behind, if there were no room for what it needs: 64 bytes a triangle.
+    let room = 100 * mesh.triangle_count();
+    Vec::<u8>::new().try_reserve_exact(room).map_err(|_| Error::MeshMemory)?;
+    Ok(MeshReport::in_box(&mesh.positions, &mesh.indices, bounds))
 }

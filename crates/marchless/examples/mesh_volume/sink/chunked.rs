@@ -47,7 +47,7 @@ impl Sink for ChunkedSink {
             let path = self.series.claim(chunk.number);
             if let Some(check) = &mut self.check {
                 check.meshes = check.meshes.map(|meshes| meshes + 1);
-                let report = examine(&chunk.mesh, self.transform.corners(chunk.samples));
+                let report = examine(&chunk.mesh, self.transform.corners(chunk.samples))?;
                 if !report.is_clean() {
                     check.reports.push((path.clone(), report));
                 }

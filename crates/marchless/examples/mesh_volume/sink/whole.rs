@@ -62,8 +62,8 @@ impl Sink for WholeSink {
 
     fn finish(self: Box<Self>, stop: &Stop) -> Result<Made, Error> {
         let Self { output, vertices, triangles, kept, .. } = *self;
-        let check =
-            kept.map(|kept| Check { meshes: None, reports: vec![(kept.path, examine(&kept.mesh, kept.bounds))] });
+        let report = |kept: Kept| Ok::<_, Error>((kept.path, examine(&kept.mesh, kept.bounds)?));
+        let check = kept.map(report).transpose()?.map(|report| Check { meshes: None, reports: vec![report] });
         let files = vec![output.complete(stop)?];
         Ok(Made { files, stale: Vec::new(), foreign: None, vertices, triangles, check })
     }
