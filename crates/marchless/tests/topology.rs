@@ -115,7 +115,6 @@ fn cells_that_leave_nothing_to_decide_are_the_same_in_both() {
 }
 
 #[test]
-#[ignore = "the exact topology is not there yet"]
 fn ambiguous_cells_have_the_topology_of_the_interpolant() {
     let seed = 0x7472_696c_696e_6561;
     println!("seed {seed:#x}");
@@ -176,7 +175,6 @@ fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Rand
 }
 
 #[test]
-#[ignore = "the exact topology is not there yet"]
 fn fields_have_the_topology_of_the_interpolant() {
     let seed = 0x6669_656c_6473;
     println!("seed {seed:#x}");
