@@ -37,8 +37,8 @@ impl Mesh {
         Self { positions, indices: self.indices.iter().map(|&index| indices[index as usize]).collect() }
     }
 
-    /// Reads a file of little-endian words: the number of vertices, three `f32` for each, and three `u32` for each triangle.
-    /// Nothing where there is no such file, since its maker had no mesh.
+    /// Reads a file of little-endian words: the number of vertices, three `f32` for each, and three `u32` for each
+    /// triangle. Nothing where there is no such file, since its maker had no mesh.
     ///
     /// # Errors
     /// Where the file cannot be read, or is not such a file.
