@@ -63,7 +63,7 @@ pub(crate) fn plugin(app: &mut App) {
         );
 }
 
-/// What balls are made of.
+/// The mesh of all balls, and the materials.
 #[derive(Resource)]
 struct Balls {
     mesh: Handle<Mesh>,
