@@ -107,10 +107,7 @@ impl Triangle {
         }
         let all_clear = (other_above | other_below | of_other == 7) & (self_above | self_below | of_self == 7);
         if all_clear && of_self.is_power_of_two() {
-            // Both planes go through the common corner, and each parts the other triangle. Let p and q lead from that corner
-            // to the next ones of this triangle, P and Q of the other one, with n = p × q and N = P × Q. The planes meet
-            // along n × N = (p·N) q − (q·N) p = (n·Q) P − (n·P) Q, which leads into this triangle where p·N > 0 > q·N, and
-            // into the other one where n·P < 0 < n·Q.
+            // As in `predicates`: where each parts the other, both go on in a common direction or they do not.
             return is_next_set(of_self, self_above) != is_next_set(of_other, other_above);
         }
         self.crosses_exactly(other)
