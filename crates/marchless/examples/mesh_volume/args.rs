@@ -52,7 +52,7 @@ pub(crate) struct Args {
     /// Print a report of the mesh's soundness; with any defect, write nothing and end with exit code 3.
     ///
     /// Where the surface leaves the volume it may be open. Each chunk is examined by itself. The mesh is held in memory:
-    /// a layer of chunks at a time with --chunk, otherwise all of it.
+    /// a layer of chunks at a time with --chunk, otherwise all of it. Examining it takes another 200 bytes a triangle.
     #[arg(long)]
     pub(crate) check: bool,
 

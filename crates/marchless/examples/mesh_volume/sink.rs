@@ -16,6 +16,9 @@ use crate::output::{self, Whole};
 pub(crate) use chunked::ChunkedSink;
 pub(crate) use whole::WholeSink;
 
+/// What examining a mesh needs at most; measured.
+const BYTES_PER_TRIANGLE: usize = 200;
+
 /// Where the mesh goes, piece by piece.
 pub(crate) trait Sink {
     /// Takes what slab `slab` has added to the mesh out of `piece`.
@@ -80,8 +83,8 @@ impl Check {
     /// [`Error::MeshMemory`].
     fn examine(&mut self, path: &Path, mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> Result<(), Error> {
         let since = Instant::now();
-        // Without room for what it needs, 64 bytes a triangle, it would end the program and leave files behind.
-        let room = 100 * mesh.triangle_count();
+        // Without room for what it needs, it would end the program and leave files behind.
+        let room = mesh.triangle_count().saturating_mul(BYTES_PER_TRIANGLE);
         Vec::<u8>::new().try_reserve_exact(room).map_err(|_| Error::MeshMemory)?;
         let report = MeshReport::in_box(&mesh.positions, &mesh.indices, bounds);
         if self.meshes.is_none() || !report.is_clean() {
