@@ -1,7 +1,7 @@
 //! The fields that everyone meshes: small, of many kinds, and reproducible.
 //!
-//! Values below 0 are inside. Each field is a cube of 8 to 33 samples per axis whose outermost layer is outside, so that
-//! a right mesh is closed.
+//! Values below 0 are inside. Each field is a cube of 8 to 33 samples per axis whose outermost layer is outside, so
+//! that a right mesh is closed.
 
 use marchless_benches::split_mix;
 use noise::{NoiseFn, Perlin};

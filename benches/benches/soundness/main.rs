@@ -1,10 +1,10 @@
-//! What is sound in the meshes of marchless and of its peers, and what is not: everyone meshes the same 304 small fields
-//! of 19 kinds, with ties, NaN and all magnitudes among them ([`fields`]), as their documentation says ([`peers`]), and
-//! [`MeshReport`](marchless::MeshReport) judges the meshes.
+//! What is sound in the meshes of marchless and of its peers, and what is not: everyone meshes the same 304 small
+//! fields of 19 kinds, with ties, NaN and all magnitudes among them ([`fields`]), as their documentation says
+//! ([`peers`]), and [`MeshReport`](marchless::MeshReport) judges the meshes.
 //!
 //! `cargo bench -p marchless_benches --bench soundness` prints the tables after some two minutes, and which meshes of
 //! ours are not clean, if any; with `MARCHLESS_RECORD=1` in the environment the tables are also written to
-//! `record/soundness.md`. `cargo test` runs it on a few small fields, and it fails there if a mesh of ours is not clean.
+//! `record/soundness.md`. `cargo test` runs it on a few small fields, and fails if a mesh of ours is not clean.
 //!
 //! `--write DIR` after `--` only writes the fields to `DIR/fields`, one file each: samples as little-endian `f32`, x
 //! fastest. `--judge DIR` judges the meshes in `DIR/meshes` too, a folder for each extractor, a file for each field

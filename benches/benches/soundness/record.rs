@@ -34,8 +34,8 @@ fn text(fields: &[Field], tallies: &[Tally]) -> String {
          ## Fields with a flaw\n\n\
          In how many of the {0} fields the mesh has any flaw, and each. Open edges are cracks and holes. Zero-area \
          triangles name a vertex twice or have their vertices on one line, exactly; their share is of all triangles of \
-         all meshes. Crossing triangles have a point in common that is on no common vertex or edge. No mesh is an error, \
-         a panic, or nothing where samples are inside.\n\n{}\n\
+         all meshes. Crossing triangles have a point in common that is on no common vertex or edge. No mesh is an \
+         error, a panic, or nothing where samples are inside.\n\n{}\n\
          ## Flaws in all fields\n\n{}\n\
          ## Fields with any flaw, by kind\n\n\
          Of {1} each. Columns are numbered in the order of the rows above.\n\n{}\n{kinds}",
