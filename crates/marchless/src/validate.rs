@@ -3,7 +3,7 @@
 //! ```text
 //! positions ──places──▶ which vertices are not finite, which lie in the same place
 //! indices ──links──▶ what surrounds each vertex: edges, fans, rims, duplicates, components
-//! both ──crossings──▶ a tree of boxes, and exact predicates where two boxes meet
+//! both ──crossings──▶ a tree of boxes; planes, and exact predicates, where two boxes meet
 //! samples, mesh ──extraction──▶ which vertex lies on which crossing
 //! ```
 
@@ -163,8 +163,8 @@ impl MeshReport {
         let links = Links::of(&triangles, nameable);
         report.boundary_edges = links.boundary.len();
         report.cracks = bounds.map_or(0, |bounds| {
-            let on_face = |edge: &&[u32; 2]| !is_on_face(edge.map(|end| positions[end as usize]), bounds);
-            links.boundary.iter().filter(on_face).count()
+            let is_crack = |edge: &&[u32; 2]| !is_on_face(edge.map(|end| positions[end as usize]), bounds);
+            links.boundary.iter().filter(is_crack).count()
         });
         report.non_manifold_edges = links.non_manifold_edges;
         report.non_manifold_vertices = links.non_manifold_vertices;
