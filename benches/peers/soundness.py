@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Extractors that Python packages offer, judged like those that are crates: `pip install vtk scikit-image PyMCubes`, then run this.
+"""Extractors that Python packages offer, judged like those that are crates.
 
-The bench `soundness` writes its fields, everyone here meshes them as they come, at 0 and with what is below 0 inside,
-and the bench judges all meshes and prints its tables; with `MARCHLESS_RECORD=1` it also writes them down. Each field is
-meshed in a process of its own, so that a crash counts as no mesh and nothing more.
+`pip install vtk scikit-image PyMCubes`, then run this. The bench `soundness` writes its fields, everyone here meshes
+them as they come, at 0, and the bench judges all meshes (positions as `f32`) and prints its tables; with
+`MARCHLESS_RECORD=1` it also writes them down. Each field is meshed in a process of its own, so that a crash counts as
+no mesh and nothing more.
 """
 
 import multiprocessing

@@ -1,5 +1,5 @@
-//! What sculpt and ambiguous_cells say and return: bad input gets one clear sentence and code 2, sculpt's headless run makes
-//! a mesh without defects, and ambiguous_cells prints its figures.
+//! What `sculpt` and `ambiguous_cells` say and return: bad input gets one clear sentence and code 2, `sculpt`'s headless
+//! run makes a mesh without defects, and `ambiguous_cells` prints its figures.
 
 mod common;
 
@@ -161,7 +161,6 @@ fn without_a_display_a_cell_s_figures_are_printed() {
 
 /// Case 4: opposite corners inside, which only a tunnel can join.
 #[test]
-#[ignore = "Topology::Trilinear still meshes as Topology::Separated"]
 fn the_topologies_of_a_cell_with_a_tunnel_differ() {
     let output = run("ambiguous_cells", &["--weights", "-1,0.1,0.3,0.3,0.3,0.1,0.1,-1"]);
     let said = String::from_utf8_lossy(&output.stdout);

@@ -71,7 +71,6 @@ fn cells_that_are_not_ambiguous_look_alike_in_both_topologies() {
 }
 
 #[test]
-#[ignore = "Topology::Trilinear still meshes as Topology::Separated"]
 fn cells_with_a_tunnel_look_different_in_both_topologies() {
     let Some(picture) = cell("cell_tunnel", "-1,0.1,0.3,0.3,0.3,0.1,0.1,-1") else { return };
     let [separated, trilinear, refined] = picture.cubes();

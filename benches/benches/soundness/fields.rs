@@ -1,7 +1,7 @@
 //! The fields that everyone meshes: small, of many kinds, and reproducible.
 //!
-//! Values below 0 are inside. Each field is a cube of 8 to 33 samples per axis whose outermost layer is outside, so that
-//! a right mesh is closed.
+//! Values below 0 are inside. Each field is a cube of 8 to 33 samples per axis whose outermost layer is outside, so
+//! that a right mesh is closed.
 
 use marchless_benches::split_mix;
 use noise::{NoiseFn, Perlin};
@@ -171,7 +171,7 @@ impl Field {
 fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn FnMut([f64; 3]) -> f32> {
     match kind {
         Kind::Signs => {
-            let share = random.from_to(0.05, 0.95);
+            let share = random.between(0.05, 0.95);
             Box::new(move |_| if random.unit() < share { -1.0 } else { 1.0 })
         }
         Kind::Steps => Box::new(move |_| random.below(5) as f32 - 2.0),
@@ -186,8 +186,8 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
             Box::new(move |p| (noise(p) * 8.0).round() as f32)
         }
         Kind::Gyroid => {
-            let (period, phase) = (random.from_to(5.0, 14.0), random.point(0.0, 6.0));
-            let level = random.from_to(-1.0, 1.0);
+            let (period, phase) = (random.between(5.0, 14.0), random.point(0.0, 6.0));
+            let level = random.between(-1.0, 1.0);
             Box::new(move |p| {
                 let [x, y, z] = [0, 1, 2].map(|axis| p[axis] * core::f64::consts::TAU / period + phase[axis]);
                 (x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos() - level) as f32
@@ -228,8 +228,8 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
         }
         Kind::Tori => {
             let centre = [0; 3].map(|_| (size / 2.0).floor());
-            let wide = random.from_to(2.0, size / 4.0).round();
-            let thick = random.from_to(1.0, wide).round();
+            let wide = random.between(2.0, size / 4.0).round();
+            let thick = random.between(1.0, wide).round();
             let turn = random.below(3);
             Box::new(move |p| {
                 let [x, y, z] = [0, 1, 2].map(|axis| (p[(axis + turn) % 3] - centre[axis]).powi(2));
@@ -240,7 +240,7 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
         Kind::ZeroPatches => {
             let noise = smooth_noise(number, &mut random);
             let balls: Vec<_> =
-                (0..6).map(|_| (random.point(0.0, size), random.from_to(1.0, size / 4.0).powi(2))).collect();
+                (0..6).map(|_| (random.point(0.0, size), random.between(1.0, size / 4.0).powi(2))).collect();
             Box::new(move |p| {
                 let zero = balls.iter().any(|&(centre, radius)| squared(p, centre) < radius);
                 if zero { 0.0 } else { noise(p) as f32 }
@@ -252,7 +252,7 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
                     let normal = random.point(-1.0, 1.0);
                     let length = squared(normal, [0.0; 3]).sqrt().max(0.1);
                     let middle = random.point(0.3 * size, 0.7 * size);
-                    (normal.map(|v| v / length), middle, random.from_to(0.15, 0.8))
+                    (normal.map(|v| v / length), middle, random.between(0.15, 0.8))
                 })
                 .collect();
             Box::new(move |p| {
@@ -263,7 +263,7 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
             })
         }
         Kind::Contacts => {
-            let (side, share) = (1.0 + random.below(3) as f64, random.from_to(0.3, 1.0));
+            let (side, share) = (1.0 + random.below(3) as f64, random.between(0.3, 1.0));
             let salt = random.next();
             Box::new(move |p| {
                 let [x, y, z] = p.map(|v| (v / side).floor() as u64);
@@ -274,7 +274,7 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
         Kind::Tiny => Box::new(move |_| random.white() * 1e-40),
         Kind::Huge => Box::new(move |_| random.white() * 3.4e38),
         Kind::AllMagnitudes => Box::new(move |_| {
-            let magnitude = 10.0f64.powf(random.from_to(-44.0, 38.0)) as f32;
+            let magnitude = 10.0f64.powf(random.between(-44.0, 38.0)) as f32;
             if random.below(2) == 0 { -magnitude } else { magnitude }
         }),
         Kind::Infinite => Box::new(move |_| match random.below(10) {
@@ -293,8 +293,8 @@ fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn 
 
 /// Perlin noise, shifted by a level.
 fn smooth_noise(number: usize, random: &mut Random) -> impl Fn([f64; 3]) -> f64 + use<> {
-    let (noise, length) = (Perlin::new(number as u32), random.from_to(4.0, 16.0));
-    let (origin, level) = (random.point(0.0, 100.0), random.from_to(-0.2, 0.2));
+    let (noise, length) = (Perlin::new(number as u32), random.between(4.0, 16.0));
+    let (origin, level) = (random.point(0.0, 100.0), random.between(-0.2, 0.2));
     move |p| noise.get([0, 1, 2].map(|axis| p[axis] / length + origin[axis])) - level
 }
 
@@ -324,15 +324,15 @@ impl Random {
 
     /// From −1 to 1.
     fn white(&mut self) -> f32 {
-        self.from_to(-1.0, 1.0) as f32
+        self.between(-1.0, 1.0) as f32
     }
 
-    fn from_to(&mut self, low: f64, high: f64) -> f64 {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
         low + self.unit() * (high - low)
     }
 
     fn point(&mut self, low: f64, high: f64) -> [f64; 3] {
-        [0; 3].map(|_| self.from_to(low, high))
+        [0; 3].map(|_| self.between(low, high))
     }
 
     fn below(&mut self, end: usize) -> usize {

@@ -9,13 +9,14 @@ pub(crate) struct Mesh {
 }
 
 impl Mesh {
-    /// The same with vertices made one where they are at most 1/65536 apart along each axis, and some up to twice as far.
+    /// The same with vertices made one where they are at most 1/65536 apart along each axis, some up to twice as far.
     pub(crate) fn welded(self) -> Self {
         let mut same: Vec<usize> = (0..self.positions.len()).collect();
         // Close ones are in the same cell of at least one of these grids, each shifted by half a cell along some axes.
         for shifts in 0..8 {
             let mut cells = HashMap::new();
-            for (index, position) in self.positions.iter().enumerate() {
+            let finite = |(_, position): &(usize, &[f32; 3])| position.iter().all(|v| v.is_finite());
+            for (index, position) in self.positions.iter().enumerate().filter(finite) {
                 let shift = |axis: usize| f64::from(shifts >> axis & 1) / 2.0;
                 let cell = [0, 1, 2].map(|axis| (f64::from(position[axis]) * 32768.0 + shift(axis)).floor() as i64);
                 let other = *cells.entry(cell).or_insert(index);
@@ -37,8 +38,8 @@ impl Mesh {
         Self { positions, indices: self.indices.iter().map(|&index| indices[index as usize]).collect() }
     }
 
-    /// Reads a file of little-endian words: the number of vertices, three `f32` for each, and three `u32` for each triangle.
-    /// Nothing where there is no such file, since its maker had no mesh.
+    /// Reads a file of little-endian words: the number of vertices, three `f32` for each, and three `u32` for each
+    /// triangle. Nothing where there is no such file, since its maker had no mesh.
     ///
     /// # Errors
     /// Where the file cannot be read, or is not such a file.

@@ -4,10 +4,9 @@
 //!   them negated).
 //! - fast-surface-nets leaves the faces on one side to the neighbour; it gets one more layer outside there.
 //! - isomesh, isosurface and transvoxel ask a function for values at positions. At lattice points it gives the
-//!   samples, between them (where isomesh asks for gradients) their trilinear interpolation.
-//! - isosurface shares only some of its vertices and mcubes none. Vertices of theirs in the same place, to the last bit,
-//!   are made one before the mesh is judged; where a vertex is computed twice with different results, a hairline crack
-//!   is left. (isosurface's positions run from 0 to 1.)
+//!   samples; between them, where isomesh asks for gradients, their trilinear interpolation.
+//! - isosurface shares only some of its vertices and mcubes none, and each cell computes its own positions. Vertices of
+//!   theirs are made one where they are the same but for rounding ([`Mesh::welded`]).
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

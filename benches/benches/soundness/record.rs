@@ -26,14 +26,16 @@ fn text(fields: &[Field], tallies: &[Tally]) -> String {
     let kinds: String = Kind::ALL.iter().map(|kind| format!("- {}: {}\n", kind.name(), kind.description())).collect();
     format!(
         "# Sound and unsound meshes\n\n\
-         {} fields of 8 to 33 samples per axis, {} of each kind, all with a layer outside around them, so that a right mesh is \
-         closed; meshed at 0 by marchless {} and its peers. Vertices that isosurface and mcubes do not share were made \
-         one where they are in the same place, to the last bit; the other meshes were judged as they came.\n\n\
+         {} fields of 8 to 33 samples per axis, {} of each kind, all with a layer outside around them, so that a right \
+         mesh is closed; meshed at 0 by marchless {} and its peers, and judged by its `MeshReport`. What asks for \
+         gradients (isomesh's dual contouring) gets central differences of the trilinear interpolation. Vertices that \
+         isosurface and mcubes do not share were made one where they are at most 1/65536 of a cell apart, since they \
+         differ by rounding; the other meshes were judged as they came, in `f32`.\n\n\
          ## Fields with a flaw\n\n\
-         In how many of the {0} fields the mesh has any flaw, and each. Open edges are cracks and holes; crossing \
-         triangles have a point in common that is on no common vertex or edge; zero-area triangles name a vertex twice or \
-         lie on a line, exactly, and their share is of all triangles of all meshes; no mesh is an error, a panic, or \
-         nothing where samples are inside.\n\n{}\n\
+         In how many of the {0} fields the mesh has any flaw, and each. Open edges are cracks and holes. Zero-area \
+         triangles name a vertex twice or have their vertices on one line, exactly; their share is of all triangles of \
+         all meshes. Crossing triangles have a point in common that is on no common vertex or edge. No mesh is an \
+         error, a panic, or nothing where samples are inside.\n\n{}\n\
          ## Flaws in all fields\n\n{}\n\
          ## Fields with any flaw, by kind\n\n\
          Of {1} each. Columns are numbered in the order of the rows above.\n\n{}\n{kinds}",

@@ -95,8 +95,8 @@ pub(crate) fn totals_table(tallies: &[Tally]) -> String {
     table(tallies, "triangles", |tally| tally.triangles.to_string(), |&(_, all)| all.to_string())
 }
 
-/// A table with a row for everyone, and columns for each flaw, for what `first` says, for there being no mesh and for the
-/// share of triangles without an area.
+/// A table with a row for everyone, and columns for what `first` says, for each flaw, for there being no mesh and for
+/// the share of triangles without an area.
 fn table(
     tallies: &[Tally],
     first: &str,

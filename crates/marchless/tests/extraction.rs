@@ -142,6 +142,21 @@ fn interior_vertices_belong_to_active_cells_of_the_trilinear_topology() {
     assert_eq!(report(trilinear, [2.25, 0.0, 0.0]), [0, 1], "beyond the last sample");
 }
 
+/// White noise has cells of every kind.
+#[test]
+fn the_trilinear_topology_needs_some_interior_vertices() {
+    let shape = Shape::cube(16).expect("a small shape");
+    let weights: Vec<i16> = (1..=shape.len() as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as i16).collect();
+    let samples = Samples::new(shape, &weights).expect("one weight a sample");
+    for topology in TOPOLOGIES {
+        let settings = MeshSettings { topology, ..MeshSettings::default() };
+        let report = ExtractionReport::new(samples, &settings, &mesh(samples, &settings));
+        assert!(report.is_sound(), "{report}");
+        assert_eq!(report.interior_vertices > 0, topology == Topology::Trilinear, "{report}");
+        assert_eq!(report.vertices, report.crossings + report.interior_vertices, "{report}");
+    }
+}
+
 #[test]
 fn samples_that_cannot_be_meshed_have_no_crossings() {
     let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];

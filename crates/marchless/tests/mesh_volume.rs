@@ -5,6 +5,8 @@
 mod check;
 #[path = "mesh_volume/chunks.rs"]
 mod chunks;
+#[path = "mesh_volume/exact.rs"]
+mod exact;
 #[path = "mesh_volume/program.rs"]
 mod program;
 #[path = "mesh_volume/readers.rs"]

@@ -76,7 +76,7 @@ impl Cell {
         few.count_ones() == 2 && few == few.reverse_bits()
     }
 
-    /// The weights negated about the isovalue's sign: what was inside is outside.
+    /// Negates the weights and the isovalue: what was inside is outside.
     pub(crate) fn flip(&mut self) {
         self.weights = self.weights.map(|weight| -weight);
         self.isovalue = -self.isovalue;

@@ -17,7 +17,7 @@ const NUMBER: egui::Color32 = egui::Color32::from_rgb(225, 228, 232);
 
 /// Where a cube's title and its figures stand. [Units: cells]
 const ABOVE: f32 = 1.2;
-const BELOW: f32 = -1.0;
+const BELOW: f32 = -1.12;
 /// How far a corner's number stands from its middle. [Units: cells]
 const OFFSET: f32 = 0.17;
 

@@ -35,9 +35,9 @@ struct Pose {
 pub(crate) struct Covered(pub(crate) f32);
 
 /// From one cube's middle to the next one's. [Units: cells]
-const SPACING: f32 = 2.15;
+const SPACING: f32 = 2.2;
 /// What the camera shows at least: the cubes and their labels. [Units: cells]
-const STAGE: Vec2 = Vec2::new(3.0 * SPACING, 2.75);
+const STAGE: Vec2 = Vec2::new(3.0 * SPACING, 2.85);
 /// The camera's vertical angle of view, small so that all cubes look alike. [Units: radians]
 const ANGLE: f32 = 0.2;
 
@@ -63,7 +63,7 @@ pub(crate) fn plugin(app: &mut App) {
         );
 }
 
-/// What balls are made of.
+/// The mesh of all balls, and the materials.
 #[derive(Resource)]
 struct Balls {
     mesh: Handle<Mesh>,

@@ -10,7 +10,7 @@ use crate::npy::NpyError;
 use crate::output::OutputError;
 use crate::sample::SampleType;
 
-/// Why there is no mesh, in one sentence. Whatever it is, no half-written file is left behind.
+/// Why there is no mesh, or not all is well, in one sentence. Whatever it is, no half-written file is left behind.
 #[derive(Debug, Error)]
 pub(crate) enum Error {
     #[error("{} is both the input and the output; the mesh needs a file of its own", path.display())]
@@ -83,7 +83,7 @@ pub(crate) enum Error {
     #[error("the mesh is not clean; nothing has been written")]
     NotClean,
 
-    #[error("{} is of an earlier mesh and cannot be removed: {source}", path.display())]
+    #[error("{} is of an earlier mesh and cannot be removed, though the new one is written: {source}", path.display())]
     Remove { path: PathBuf, source: io::Error },
 
     #[error("{} cannot be written: {source}", path.display())]

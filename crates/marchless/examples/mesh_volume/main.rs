@@ -72,7 +72,8 @@ fn run(args: &Args) -> Result<(), Error> {
     made.put()?;
     say(&summary);
     if let Some((first, count)) = foreign {
-        note(format_args!("{} is none of these chunks and left as it is (files alike: {count})", first.display()));
+        let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+        note(format_args!("no chunk of this mesh, and so left as it was: {}{more}", first.display()));
     }
     if is_empty {
         note(format_args!(
@@ -106,9 +107,12 @@ fn summary(args: &Args, volume: &Volume, chunks: Option<&Chunks>, made: &Made, t
     let chunks = chunks.map_or_else(String::new, |chunks| {
         format!(" in {} chunks, {} of them with a surface", chunks.count, made.files.len())
     });
-    let [reading, meshing, writing] = [times.reading, times.meshing, times.writing].map(|time| time.as_secs_f64());
+    let check = made.check.as_ref().map(|check| check.time);
+    let writing = times.writing.saturating_sub(check.unwrap_or_default());
+    let [reading, meshing, writing] = [times.reading, times.meshing, writing].map(|time| time.as_secs_f64());
+    let checked = check.map_or_else(String::new, |time| format!(", checked in {:.2} s", time.as_secs_f64()));
     format!(
-        "{}: {x} × {y} × {z} {}{chunks}, {} vertices, {} triangles; read in {reading:.2} s, meshed in {meshing:.2} s, written in {writing:.2} s\n",
+        "{}: {x} × {y} × {z} {}{chunks}, {} vertices, {} triangles; read in {reading:.2} s, meshed in {meshing:.2} s, written in {writing:.2} s{checked}\n",
         args.output.display(),
         volume.sample_type,
         made.vertices,

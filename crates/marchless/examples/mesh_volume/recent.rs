@@ -15,7 +15,7 @@ pub(crate) struct Recent<T> {
     pieces: VecDeque<usize>,
 }
 
-impl<T: Copy> Recent<T> {
+impl<T> Recent<T> {
     pub(crate) const fn new() -> Self {
         Self { vertices: VecDeque::new(), gone: 0, pieces: VecDeque::new() }
     }
@@ -34,7 +34,11 @@ impl<T: Copy> Recent<T> {
         Ok(())
     }
 
-    pub(crate) fn get(&self, index: u32) -> Option<T> {
-        self.vertices.get((index as usize).checked_sub(self.gone)?).copied()
+    pub(crate) fn get(&self, index: u32) -> Option<&T> {
+        self.vertices.get((index as usize).checked_sub(self.gone)?)
+    }
+
+    pub(crate) fn get_mut(&mut self, index: u32) -> Option<&mut T> {
+        self.vertices.get_mut((index as usize).checked_sub(self.gone)?)
     }
 }

@@ -4,7 +4,8 @@ mod chunked;
 mod series;
 mod whole;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 use std::{fmt, fs};
 
 use marchless::{MeshBuffer, MeshReport};
@@ -14,6 +15,9 @@ use crate::error::Error;
 use crate::output::{self, Whole};
 pub(crate) use chunked::ChunkedSink;
 pub(crate) use whole::WholeSink;
+
+/// What examining a mesh needs at most; measured.
+const BYTES_PER_TRIANGLE: usize = 200;
 
 /// Where the mesh goes, piece by piece.
 pub(crate) trait Sink {
@@ -58,15 +62,39 @@ impl Made {
 }
 
 /// What `--check` has found.
-#[derive(Default)]
 pub(crate) struct Check {
     /// How many meshes it has looked at, where those that are clean are not listed.
     pub(crate) meshes: Option<u64>,
     /// Which meshes, and what it has found.
     pub(crate) reports: Vec<(PathBuf, MeshReport)>,
+    /// How long it took.
+    pub(crate) time: Duration,
 }
 
 impl Check {
+    /// Nothing yet. `several`: list no mesh that is clean.
+    fn new(several: bool) -> Self {
+        Self { meshes: several.then_some(0), reports: Vec::new(), time: Duration::ZERO }
+    }
+
+    /// Examines a mesh that may be open where it leaves the box `[min, max]`.
+    ///
+    /// # Errors
+    /// [`Error::MeshMemory`].
+    fn examine(&mut self, path: &Path, mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> Result<(), Error> {
+        let since = Instant::now();
+        // Without room for what it needs, it would end the program and leave files behind.
+        let room = mesh.triangle_count().saturating_mul(BYTES_PER_TRIANGLE);
+        Vec::<u8>::new().try_reserve_exact(room).map_err(|_| Error::MeshMemory)?;
+        let report = MeshReport::in_box(&mesh.positions, &mesh.indices, bounds);
+        if self.meshes.is_none() || !report.is_clean() {
+            self.reports.push((path.to_owned(), report));
+        }
+        self.meshes = self.meshes.map(|meshes| meshes + 1);
+        self.time += since.elapsed();
+        Ok(())
+    }
+
     pub(crate) fn is_clean(&self) -> bool {
         self.reports.iter().all(|(_, report)| report.is_clean())
     }
@@ -83,9 +111,4 @@ impl fmt::Display for Check {
             (Some(meshes), defective) => writeln!(f, "meshes checked: {meshes}, with defects: {defective}"),
         }
     }
-}
-
-/// Examines a mesh that may be open where it leaves the box `[min, max]`.
-fn examine(mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> MeshReport {
-    MeshReport::in_box(&mesh.positions, &mesh.indices, bounds)
 }

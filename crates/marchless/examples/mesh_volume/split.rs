@@ -5,7 +5,7 @@
 //! triangles of the whole mesh. (Refused: meshing each chunk from samples of its own. Its positions would be rounded
 //! elsewhere than the whole mesh's, and it would need a layer of padding that the volume's border does not have.)
 
-use std::collections::{BTreeMap, HashMap, TryReserveError};
+use std::collections::{HashMap, TryReserveError};
 use std::num::NonZeroU32;
 
 use marchless::MeshBuffer;
@@ -66,17 +66,19 @@ impl Chunks {
 /// Takes the whole mesh apart while it comes; holds what belongs to one layer of chunks.
 pub(crate) struct Split {
     chunks: Chunks,
-    recent: Recent<[[f32; 3]; 2]>,
-    /// The chunks of the present layer that have a triangle, by their positions along the second and the first axis.
-    layer: BTreeMap<[u32; 2], Part>,
+    recent: Recent<Vertex>,
+    /// The present layer: the mesh of each chunk that has one, x (of the file) fastest.
+    layer: Vec<Option<Box<MeshBuffer>>>,
+    /// The names that vertices on borders have in chunks other than the [last](Vertex::last), by chunk and index.
+    names: HashMap<(u64, u32), u32>,
 }
 
-/// The part of the mesh in one chunk.
-#[derive(Default)]
-struct Part {
-    mesh: MeshBuffer,
-    /// What the whole mesh's vertices are called here.
-    names: HashMap<u32, u32>,
+/// A vertex of the whole mesh.
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+    /// The chunk of the triangle that had it last, and its index in that chunk's mesh.
+    last: Option<(u64, u32)>,
 }
 
 /// A chunk with a surface, all of it.
@@ -89,8 +91,8 @@ pub(crate) struct Chunk {
 }
 
 impl Split {
-    pub(crate) const fn new(chunks: Chunks) -> Self {
-        Self { chunks, recent: Recent::new(), layer: BTreeMap::new() }
+    pub(crate) fn new(chunks: Chunks) -> Self {
+        Self { chunks, recent: Recent::new(), layer: Vec::new(), names: HashMap::new() }
     }
 
     /// Takes in what the mesher has made of slab `slab`: the vertices on it and below it, the triangles between it and
@@ -99,46 +101,74 @@ impl Split {
     /// # Errors
     /// [`Error::MeshMemory`].
     pub(crate) fn take(&mut self, slab: u32, piece: &MeshBuffer) -> Result<Vec<Chunk>, Error> {
-        let vertices = piece.positions.iter().zip(&piece.normals).map(|(&position, &normal)| [position, normal]);
+        let vertices = piece.positions.iter().zip(&piece.normals);
+        let vertices = vertices.map(|(&position, &normal)| Vertex { position, normal, last: None });
         self.recent.extend(vertices).map_err(|_| Error::MeshMemory)?;
+        let Some(z) = slab.checked_sub(1) else { return Ok(Vec::new()) };
+
+        let size = self.chunks.size;
+        let [width, depth, _] = self.chunks.cells.map(|cells| cells.div_ceil(size) as usize);
+        self.layer.resize_with(width * depth, || None);
         for triangle in piece.triangles() {
-            let corners = triangle.map(|index| self.recent.get(index));
+            let corners = triangle.map(|index| self.recent.get(index).map(|vertex| vertex.position));
             let [Some(a), Some(b), Some(c)] = corners else { return Err(Error::VertexMissing) };
             // No triangle lies within a face of its cell. (Beyond 16,384 samples, rounding can bring one there; then
-            // it counts to the far side.)
-            let [x, y] = [0, 1].map(|axis| a[0][axis].min(b[0][axis]).min(c[0][axis]) as u32);
-            let chunk = [y, x].map(|cell| cell / self.chunks.size);
-            let part = self.layer.entry(chunk).or_default();
-            part.add(triangle, [a, b, c]).map_err(|_| Error::MeshMemory)?;
+            // it counts to the far side, if there is any.)
+            let [x, y] = [0, 1].map(|axis| {
+                let cell = a[axis].min(b[axis]).min(c[axis]) as u32;
+                cell.min(self.chunks.cells[axis] - 1) / size
+            });
+            let number = self.chunks.number([x, y, z / size]);
+            let slot = self.layer.get_mut(x as usize + width * y as usize).ok_or(Error::VertexMissing)?;
+            let mesh = slot.get_or_insert_default();
+            mesh.indices.try_reserve(3).map_err(|_| Error::MeshMemory)?;
+            for index in triangle {
+                let vertex = self.recent.get_mut(index).ok_or(Error::VertexMissing)?;
+                let name = vertex.name(index, number, mesh, &mut self.names).map_err(|_| Error::MeshMemory)?;
+                mesh.indices.push(name);
+            }
         }
-        if slab == 0 || (!slab.is_multiple_of(self.chunks.size) && slab < self.chunks.cells[2]) {
+        if !slab.is_multiple_of(size) && slab < self.chunks.cells[2] {
             return Ok(Vec::new());
         }
-        let layer = (slab - 1) / self.chunks.size;
-        let parts = std::mem::take(&mut self.layer).into_iter().map(|([y, x], part)| {
-            let chunk = [x, y, layer];
-            Chunk { number: self.chunks.number(chunk), samples: self.chunks.samples(chunk), mesh: part.mesh }
+        self.names.clear();
+        let parts = self.layer.drain(..).enumerate().filter_map(|(place, mesh)| {
+            let chunk = [(place % width) as u32, (place / width) as u32, z / size];
+            let (number, samples) = (self.chunks.number(chunk), self.chunks.samples(chunk));
+            Some(Chunk { number, samples, mesh: *mesh? })
         });
         Ok(parts.collect())
     }
 }
 
-impl Part {
-    /// Adds a triangle of these vertices (positions and normals).
-    fn add(&mut self, triangle: [u32; 3], corners: [[[f32; 3]; 2]; 3]) -> Result<(), TryReserveError> {
-        let Self { mesh, names } = self;
-        mesh.indices.try_reserve(3)?;
-        names.try_reserve(3)?;
-        mesh.positions.try_reserve(3)?;
-        mesh.normals.try_reserve(3)?;
-        for (index, [position, normal]) in triangle.into_iter().zip(corners) {
-            let name = *names.entry(index).or_insert_with(|| {
-                mesh.positions.push(position);
-                mesh.normals.push(normal);
-                mesh.positions.len() as u32 - 1
-            });
-            mesh.indices.push(name);
+impl Vertex {
+    /// The vertex's index in the mesh of chunk `chunk`, to which it is added if that has not had it yet. `index`: the
+    /// one in the whole mesh.
+    fn name(
+        &mut self,
+        index: u32,
+        chunk: u64,
+        mesh: &mut MeshBuffer,
+        names: &mut HashMap<(u64, u32), u32>,
+    ) -> Result<u32, TryReserveError> {
+        if let Some((last, name)) = self.last {
+            if last == chunk {
+                return Ok(name);
+            }
+            names.try_reserve(1)?;
+            names.insert((last, index), name);
         }
-        Ok(())
+        let name = match names.get(&(chunk, index)) {
+            Some(&name) => name,
+            None => {
+                mesh.positions.try_reserve(1)?;
+                mesh.normals.try_reserve(1)?;
+                mesh.positions.push(self.position);
+                mesh.normals.push(self.normal);
+                mesh.positions.len() as u32 - 1
+            }
+        };
+        self.last = Some((chunk, name));
+        Ok(name)
     }
 }

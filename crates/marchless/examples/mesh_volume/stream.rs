@@ -17,6 +17,7 @@ use crate::sink::{Made, Sink};
 pub(crate) struct Times {
     pub(crate) reading: Duration,
     pub(crate) meshing: Duration,
+    /// Checking the mesh, too.
     pub(crate) writing: Duration,
 }
 

@@ -94,24 +94,37 @@ impl Triangle {
                 of_other |= same << j;
             }
         }
-        // A copy is not clear of the original.
-        of_self == 7
-            || !self.is_clear_of(other, of_other) && !other.is_clear_of(self, of_self) && self.crosses_exactly(other)
+        if of_self == 7 {
+            return true;
+        }
+        let (other_above, other_below) = self.sides(other);
+        if (other_above | of_other == 7) | (other_below | of_other == 7) {
+            return false;
+        }
+        let (self_above, self_below) = other.sides(self);
+        if (self_above | of_self == 7) | (self_below | of_self == 7) {
+            return false;
+        }
+        let all_clear = (other_above | other_below | of_other == 7) & (self_above | self_below | of_self == 7);
+        if all_clear && of_self.is_power_of_two() {
+            // As in `predicates`: where each parts the other, both go on in a common direction or they do not.
+            return is_next_set(of_self, self_above) != is_next_set(of_other, other_above);
+        }
+        self.crosses_exactly(other)
     }
 
-    /// Whether the other one's corners, but those that are `common`, are all clearly on the same side of the plane; or, of
-    /// a neighbour, just off it.
+    /// Which corners of the other one are clearly above the plane, and which below; a bit each.
     #[inline(always)]
-    fn is_clear_of(&self, other: &Self, common: u32) -> bool {
+    fn sides(&self, other: &Self) -> (u32, u32) {
         let doubt = self.doubt * (self.size + other.size);
-        let (mut above, mut below) = (common, common);
+        let (mut above, mut below) = (0, 0);
         for (i, &corner) in other.corners.iter().enumerate() {
             let [x, y, z] = from(self.corners[0], corner);
             let height = x * self.normal[0] + y * self.normal[1] + z * self.normal[2];
             above |= u32::from(height > doubt) << i;
             below |= u32::from(height < -doubt) << i;
         }
-        (above == 7) | (below == 7)
+        (above, below)
     }
 
     #[cold]
@@ -131,6 +144,12 @@ impl Triangle {
         }
         cross(&a.0, &b.0, common)
     }
+}
+
+/// Whether a bit is set for the corner after the one whose bit is `corner`.
+#[inline(always)]
+const fn is_next_set(corner: u32, bits: u32) -> bool {
+    (bits | bits << 3) & corner << 1 != 0
 }
 
 /// From one point to another, in `f64`, where it does not overflow.

@@ -21,10 +21,8 @@ pub(super) fn has_no_area(corners: &Corners) -> bool {
 /// Both have an area.
 pub(super) fn cross(a: &Corners, b: &Corners, common: usize) -> bool {
     match common {
-        0 => !apart(a, b, 0) && (0..3).any(|i| meets(a, [b[i], b[(i + 1) % 3]]) || meets(b, [a[i], a[(i + 1) % 3]])),
-        // A line from the common vertex to another common point can be followed to the side opposite the vertex, in
-        // one triangle while still within the other.
-        1 => !apart(a, b, 1) && (meets(a, [b[1], b[2]]) || meets(b, [a[1], a[2]])),
+        0 => cross_apart(a, b),
+        1 => cross_at_corner(a, b),
         // In one plane, and on one side of the common edge.
         2 => {
             let axis = flat_axis(a);
@@ -34,14 +32,48 @@ pub(super) fn cross(a: &Corners, b: &Corners, common: usize) -> bool {
     }
 }
 
-/// Whether all corners of one triangle but the first `common` are on one side of the other's plane. Then they have no
-/// other point in common than those corners.
-fn apart(a: &Corners, b: &Corners, common: usize) -> bool {
+/// The same for triangles without a common corner.
+fn cross_apart(a: &Corners, b: &Corners) -> bool {
     let on_one_side = |a: &Corners, b: &Corners| {
-        let first = side(a, b[common]);
-        first != 0.0 && b[common + 1..].iter().all(|&corner| side(a, corner) * first.signum() > 0.0)
+        let sides = b.map(|corner| side(a, corner));
+        sides.iter().all(|&side| side > 0.0) || sides.iter().all(|&side| side < 0.0)
     };
-    on_one_side(a, b) || on_one_side(b, a)
+    let edges = |corners: &Corners| [[corners[0], corners[1]], [corners[1], corners[2]], [corners[2], corners[0]]];
+    !on_one_side(a, b)
+        && !on_one_side(b, a)
+        && (edges(b).into_iter().any(|edge| meets(a, edge)) || edges(a).into_iter().any(|edge| meets(b, edge)))
+}
+
+/// The same for triangles whose first corner is the same: whether they go on in a common direction from there.
+fn cross_at_corner(a: &Corners, b: &Corners) -> bool {
+    let in_a = [side(a, b[1]), side(a, b[2])];
+    if in_a == [0.0; 2] {
+        // In one plane, where a side of one of them leads into the other.
+        let axis = flat_axis(a);
+        let turns = [1, 2].map(|i| [1, 2].map(|j| turn(axis, [a[0], a[i], b[j]])));
+        let [a_turn, b_turn] = [turn(axis, *a), turn(axis, *b)];
+        let within = |from: f64, to: f64, turn: f64| from * turn.signum() >= 0.0 && to * turn.signum() <= 0.0;
+        return (0..2).any(|j| within(turns[0][j], turns[1][j], a_turn))
+            || (0..2).any(|i| within(-turns[i][0], -turns[i][1], b_turn));
+    }
+    let in_b = [side(b, a[1]), side(b, a[2])];
+    if is_one_sided(in_a) || is_one_sided(in_b) {
+        return false;
+    }
+    // The planes meet in a line through the corner. Let p and q lead from there to the others of `a`, P and Q to those of
+    // `b`, with n = p × q and N = P × Q. Then the line is along n × N = (p·N) q − (q·N) p = (n·Q) P − (n·P) Q: into `a`
+    // where p·N ≥ 0 ≥ q·N, and into `b` where n·P ≤ 0 ≤ n·Q.
+    leads_down(in_b) != leads_down(in_a)
+}
+
+/// Whether both of two sides are above, or both below.
+fn is_one_sided([first, second]: [f64; 2]) -> bool {
+    (first > 0.0 && second > 0.0) || (first < 0.0 && second < 0.0)
+}
+
+/// Whether the first of two sides, not both of which are 0, is above the second, where they are not one-sided.
+fn leads_down([first, second]: [f64; 2]) -> bool {
+    first > 0.0 || second < 0.0
 }
 
 /// Whether a triangle and a line segment have a point in common.
@@ -51,7 +83,7 @@ fn meets(triangle: &Corners, [p, q]: [[f32; 3]; 2]) -> bool {
     if p_side == 0.0 && q_side == 0.0 {
         return meets_in_plane(flat_axis(triangle), triangle, [p, q]);
     }
-    if (p_side > 0.0 && q_side > 0.0) || (p_side < 0.0 && q_side < 0.0) {
+    if is_one_sided([p_side, q_side]) {
         return false;
     }
     // The line goes through the plane in one point, and passes the three sides on the same hand where that is within.
@@ -72,8 +104,7 @@ fn meets_in_plane(axis: usize, &[a, b, c]: &Corners, [p, q]: [[f32; 3]; 2]) -> b
 fn segments_meet(axis: usize, [p, q]: [[f32; 3]; 2], [a, b]: [[f32; 3]; 2]) -> bool {
     let from_pq = [turn(axis, [p, q, a]), turn(axis, [p, q, b])];
     let from_ab = [turn(axis, [a, b, p]), turn(axis, [a, b, q])];
-    let same = |[first, second]: [f64; 2]| (first > 0.0 && second > 0.0) || (first < 0.0 && second < 0.0);
-    if same(from_pq) || same(from_ab) {
+    if is_one_sided(from_pq) || is_one_sided(from_ab) {
         return false;
     }
     // On one line, they meet where their boxes do.

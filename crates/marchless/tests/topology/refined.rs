@@ -70,12 +70,20 @@ impl Refined {
         let mut inside = vec![false; size.iter().product()];
         for cell in lattice.cells() {
             let corners = lattice.corners(cell);
+            // A mean of positive numbers is positive.
+            if corners.iter().all(|&corner| corner > 0.0) {
+                continue;
+            }
+            // Points that cells share are computed by each, with the same result: everything is exact.
+            let mix = |a: f64, b: f64, at: usize| a * (steps - at) as f64 + b * at as f64;
             for z in 0..=steps {
+                let [v0, v1, v2, v3] = [0, 1, 2, 3].map(|corner| mix(corners[corner], corners[corner + 4], z));
                 for y in 0..=steps {
-                    for x in 0..=steps {
-                        // Points that cells share are computed by each, with the same result: the sum is exact.
-                        let [i, j, k] = [(0, x), (1, y), (2, z)].map(|(axis, step)| cell[axis] * steps + step);
-                        inside[i + size[0] * (j + size[1] * k)] = interpolated(&corners, [x, y, z], steps) < 0.0;
+                    let (low, high) = (mix(v0, v2, y), mix(v1, v3, y));
+                    let [i, j, k] = [cell[0] * steps, cell[1] * steps + y, cell[2] * steps + z];
+                    let row = &mut inside[i + size[0] * (j + size[1] * k)..][..=steps];
+                    for (x, inside) in row.iter_mut().enumerate() {
+                        *inside = mix(low, high, x) < 0.0;
                     }
                 }
             }
@@ -94,14 +102,6 @@ impl Refined {
         let [x_end, y_end, z_end] = core::array::from_fn(|axis| self.size[axis] - usize::from(axes[axis]));
         (0..z_end).flat_map(move |z| (0..y_end).flat_map(move |y| (0..x_end).map(move |x| x + nx * (y + ny * z))))
     }
-}
-
-/// The interpolant times `steps`³, `at` small steps from the lowest corner.
-fn interpolated(corners: &[f64; 8], at: [usize; 3], steps: usize) -> f64 {
-    let weight = |corner: usize| -> usize {
-        (0..3).map(|axis| if corner >> axis & 1 == 1 { at[axis] } else { steps - at[axis] }).product()
-    };
-    (0..8).map(|corner| corners[corner] * weight(corner) as f64).sum()
 }
 
 /// The orders of the axes: the way from a small cell's lowest corner to its highest, a step along each.

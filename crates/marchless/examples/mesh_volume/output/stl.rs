@@ -23,7 +23,7 @@ impl Encoder for Stl {
     fn encode(&mut self, piece: &MeshBuffer, body: &mut dyn Write, _tail: &mut dyn Write) -> Result<(), OutputError> {
         self.recent.extend(piece.positions.iter().copied()).map_err(io::Error::from)?;
         for triangle in piece.triangles() {
-            let corners = triangle.map(|index| self.recent.get(index));
+            let corners = triangle.map(|index| self.recent.get(index).copied());
             let [Some(a), Some(b), Some(c)] = corners else {
                 return Err(OutputError::VertexMissing { triangle: self.triangles });
             };

@@ -3,7 +3,7 @@
 use marchless::MeshBuffer;
 
 use super::series::Series;
-use super::{Check, Made, Sink, examine};
+use super::{Check, Made, Sink};
 use crate::Stop;
 use crate::args::Args;
 use crate::error::Error;
@@ -33,7 +33,7 @@ impl ChunkedSink {
             files: Vec::new(),
             vertices: 0,
             triangles: 0,
-            check: args.check.then(|| Check { meshes: Some(0), reports: Vec::new() }),
+            check: args.check.then(|| Check::new(true)),
         })
     }
 }
@@ -46,11 +46,7 @@ impl Sink for ChunkedSink {
             self.triangles += chunk.mesh.triangle_count() as u64;
             let path = self.series.claim(chunk.number);
             if let Some(check) = &mut self.check {
-                check.meshes = check.meshes.map(|meshes| meshes + 1);
-                let report = examine(&chunk.mesh, self.transform.corners(chunk.samples));
-                if !report.is_clean() {
-                    check.reports.push((path.clone(), report));
-                }
+                check.examine(&path, &chunk.mesh, self.transform.corners(chunk.samples))?;
             }
             let mut output = Output::create(&path)?;
             output.append(&chunk.mesh)?;

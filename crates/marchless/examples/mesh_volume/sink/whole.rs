@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use marchless::MeshBuffer;
 
-use super::{Check, Made, Sink, examine};
+use super::{Check, Made, Sink};
 use crate::Stop;
 use crate::args::Args;
 use crate::error::Error;
@@ -62,8 +62,11 @@ impl Sink for WholeSink {
 
     fn finish(self: Box<Self>, stop: &Stop) -> Result<Made, Error> {
         let Self { output, vertices, triangles, kept, .. } = *self;
-        let check =
-            kept.map(|kept| Check { meshes: None, reports: vec![(kept.path, examine(&kept.mesh, kept.bounds))] });
+        let check = kept.map(|Kept { path, mesh, bounds }| {
+            let mut check = Check::new(false);
+            check.examine(&path, &mesh, bounds).map(|()| check)
+        });
+        let check = check.transpose()?;
         let files = vec![output.complete(stop)?];
         Ok(Made { files, stale: Vec::new(), foreign: None, vertices, triangles, check })
     }
