@@ -34,8 +34,13 @@ use super::{
 use crate::{buffer::MeshBuffer, cell::CaseIndex, sample::Weight, simd::Simd};
 
 /// The decided cells between two slabs, in the order of all cells.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Exact {
+    /// The lattice positions of open cells that are not decided yet.
+    x: [u32; ROOM],
+    y: [u32; ROOM],
+    /// Those of them that the faces may have made differ from their case.
+    decided: [Decided; ROOM],
     cells: Vec<ExactCell>,
     /// Of the cells that are made one by one, corners named as in [`ExactCell::triangles`].
     triangles: Vec<[u8; 3]>,
@@ -65,22 +70,25 @@ pub(super) enum Change {
     },
 }
 
-/// A cell that is to be decided.
-struct Open<'a, W> {
-    lattice: &'a Lattice,
-    planes: &'a Planes<'a, W>,
-    settings: &'a MeshSettings,
-    /// The lattice position of its lowest corner.
-    x: u32,
-    y: u32,
-    case: CaseIndex,
-    /// Its corners' weights less the isovalue, in voxels.
-    weights: [f64; 8],
+/// An open cell whose faces are decided, and which may differ from its case.
+#[derive(Clone, Copy, Debug)]
+struct Decided {
+    /// Its place in the lists of open cells.
+    place: u8,
+    /// A bit for each face whose inside corners are joined.
+    joined: u8,
+    outcome: Outcome,
 }
+
+/// Open cells that are listed before they are decided, so that deciding is a loop without branches.
+const GATHERED: usize = 128;
+/// Room for them, and for the rest of the word that makes them enough.
+const ROOM: usize = GATHERED + 64;
 
 impl Exact {
     pub(super) const fn new() -> Self {
-        Self { cells: Vec::new(), triangles: Vec::new() }
+        let decided = [Decided { place: 0, joined: 0, outcome: Outcome::NONE }; ROOM];
+        Self { x: [0; ROOM], y: [0; ROOM], decided, cells: Vec::new(), triangles: Vec::new() }
     }
 
     pub(super) fn clear(&mut self) {
@@ -117,7 +125,7 @@ impl Exact {
         out: &mut MeshBuffer,
     ) -> u64 {
         self.clear();
-        let mut made = 0;
+        let (mut made, mut gathered) = (0, 0);
         let (words, last_bit) = (lattice.words, lattice.last_word ^ lattice.last_word >> 1);
         let mut open = [0; WORDS];
         let cells = words * (lattice.size[1] - 1);
@@ -133,47 +141,72 @@ impl Exact {
                 nonzero &= nonzero - 1;
                 let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
                 // Behind a row's last cell, its last samples stand for those that are missing.
-                let mut bits = open[i % WORDS] & if ends_row { !last_bit } else { u64::MAX };
-                while bits != 0 {
-                    let (word, bit) = (start + i, bits.trailing_zeros());
-                    bits &= bits - 1;
-                    made += self.cell(lattice, planes, settings, word, bit, first_vertex + made, bounds, out);
+                let bits = open[i % WORDS] & if ends_row { !last_bit } else { u64::MAX };
+                let (y, x) = lattice.place_of(start + i);
+                let (xs, ys) = (self.x[gathered..].first_chunk_mut(), self.y[gathered..].first_chunk_mut());
+                let (xs, ys) = xs.zip(ys).expect("there is room for another word's");
+                gathered += S::positions(bits, x, y, xs, ys);
+                if gathered >= GATHERED {
+                    made += self.flush(gathered, lattice, planes, settings, first_vertex + made, bounds, out);
+                    gathered = 0;
                 }
             }
         }
-        made
+        made + self.flush(gathered, lattice, planes, settings, first_vertex + made, bounds, out)
     }
 
-    /// Decides one cell; returns how many vertices it got in its interior.
+    /// Decides the first `count` cells that were gathered; returns how many vertices they got in their interior.
     #[inline(never)]
-    fn cell<W: Weight>(
+    fn flush<W: Weight>(
         &mut self,
+        count: usize,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
         settings: &MeshSettings,
-        word: usize,
-        bit: u32,
         first_vertex: u64,
         bounds: &mut Bounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        let (y, x) = lattice.place_of(word);
-        let open = Open::new(lattice, planes, settings, x + bit, y);
-        let (joined, outcome) = open.decide_faces();
-        let waist = if outcome.may_have_tunnel() { tunnel::waist(&open.weights) } else { None };
-        if waist.is_none() && !outcome.is_made() {
-            if outcome.code() != u16::from(open.case.0) {
-                self.cells.push(ExactCell { word, bit, change: Change::Code(outcome.code()) });
-            }
-            return 0;
+        let mut changed = 0;
+        for place in 0..count {
+            let weights = weights(lattice, planes, settings, self.x[place], self.y[place]);
+            let case = case_of(&weights);
+            let joined = joined_faces(&weights, case);
+            let outcome = table::outcome(case, joined);
+            self.decided[changed] = Decided { place: place as u8, joined, outcome };
+            changed += usize::from(outcome.differs_from(case));
         }
-        let start = self.triangles.len() as u32;
-        let vertices = open.make(joined, waist, &mut self.triangles, bounds, out);
-        let triangles = [start, self.triangles.len() as u32 - start];
-        let change = Change::Made { first_interior: first_vertex as u32, triangles };
-        self.cells.push(ExactCell { word, bit, change });
-        vertices
+        let mut made = 0;
+        for index in 0..changed {
+            let Decided { place, joined, outcome } = self.decided[index];
+            let [x, y] = [self.x[usize::from(place)], self.y[usize::from(place)]];
+            let weights = weights(lattice, planes, settings, x, y);
+            let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
+            let change = if waist.is_some() || outcome.is_made() {
+                let cell = Open { lattice, planes, settings, x, y, case: case_of(&weights), weights };
+                let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len() as u32);
+                made += cell.make(joined, waist, &mut self.triangles, bounds, out);
+                Change::Made { first_interior, triangles: [start, self.triangles.len() as u32 - start] }
+            } else {
+                Change::Code(outcome.code())
+            };
+            let word = y as usize * lattice.words + x as usize / 64;
+            self.cells.push(ExactCell { word, bit: x % 64, change });
+        }
+        made
     }
+}
+
+/// A cell that is made.
+struct Open<'a, W> {
+    lattice: &'a Lattice,
+    planes: &'a Planes<'a, W>,
+    settings: &'a MeshSettings,
+    /// The lattice position of its lowest corner.
+    x: u32,
+    y: u32,
+    case: CaseIndex,
+    weights: [f64; 8],
 }
 
 /// The bits of the cells whose case leaves something open. Bit `x` of `corners[k]` is corner `k` of cell `x`.
@@ -188,38 +221,38 @@ const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
     across_x | across_y | across_z | diagonal
 }
 
-impl<'a, W: Weight> Open<'a, W> {
-    fn new(lattice: &'a Lattice, planes: &'a Planes<'a, W>, settings: &'a MeshSettings, x: u32, y: u32) -> Self {
-        let at = lattice.index(x, y);
-        let pair = |corner: usize| {
-            let row = &planes.slabs[1 + corner / 4][at + corner / 2 % 2 * lattice.stride..][..2];
-            [row[0], row[1]].map(W::to_voxels)
-        };
-        let ([a, b], [c, d], [e, f], [g, h]) = (pair(0), pair(2), pair(4), pair(6));
-        let mut weights = [a, b, c, d, e, f, g, h].map(f64::from);
-        let mut case = 0;
-        for (corner, weight) in weights.iter_mut().enumerate() {
-            *weight -= f64::from(settings.isovalue);
-            case |= u8::from(*weight < 0.0) << corner;
-        }
-        Self { lattice, planes, settings, x, y, case: CaseIndex(case), weights }
+/// The weights at a cell's corners, less the isovalue, in voxels.
+#[inline(always)]
+fn weights<W: Weight>(lattice: &Lattice, planes: &Planes<'_, W>, settings: &MeshSettings, x: u32, y: u32) -> [f64; 8] {
+    let (at, isovalue) = (lattice.index(x, y), f64::from(settings.isovalue));
+    let [_, low, high, _] = planes.slabs;
+    let mut weights = [0.0; 8];
+    for (pair, weights) in weights.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+        let slab = if pair < 2 { low } else { high };
+        let row = &slab[at + pair % 2 * lattice.stride..][..2];
+        *weights = [f64::from(row[0].to_voxels()) - isovalue, f64::from(row[1].to_voxels()) - isovalue];
     }
+    weights
+}
 
-    /// A bit for each face whose inside corners are joined, and what that comes to.
-    fn decide_faces(&self) -> (u8, Outcome) {
-        let (mut faces, mut joined, mut number, mut place) = (table::ambiguous_faces(self.case), 0, 0, 0);
-        while faces != 0 {
-            let face = faces.trailing_zeros() as usize;
-            faces &= faces - 1;
-            let [a, b, c, d] = FACE_CORNERS[face].map(|corner| self.weights[corner]);
-            let (along, across) = (a * c, b * d);
-            let (inside, outside) = if a < 0.0 { (along, across) } else { (across, along) };
-            // Comparisons with NaN are false.
-            let is_joined = u8::from(inside > outside && inside < f64::INFINITY);
-            joined |= is_joined << face;
-            number |= usize::from(is_joined) << place;
-            place += 1;
-        }
-        (joined, table::outcome(self.case, number))
+#[inline(always)]
+fn case_of(weights: &[f64; 8]) -> CaseIndex {
+    let mut case = 0;
+    for (corner, &weight) in weights.iter().enumerate() {
+        case |= u8::from(weight < 0.0) << corner;
     }
+    CaseIndex(case)
+}
+
+/// A bit for each ambiguous face whose inside corners are joined.
+#[inline(always)]
+fn joined_faces(weights: &[f64; 8], case: CaseIndex) -> u8 {
+    let mut joined = 0;
+    for (face, [a, b, c, d]) in FACE_CORNERS.into_iter().enumerate() {
+        let (along, across) = (weights[a] * weights[c], weights[b] * weights[d]);
+        let (inside, outside) = if case.0 >> a & 1 == 1 { (along, across) } else { (across, along) };
+        // Comparisons with NaN are false.
+        joined |= u8::from((inside > outside) & (inside < f64::INFINITY)) << face;
+    }
+    joined & table::ambiguous_faces(case)
 }

@@ -3,10 +3,11 @@
 use crate::{
     cases::{Loops, triangulate},
     cell::{CaseIndex, Edge, Face},
+    mesher::triangles::FIRST_EXTRA,
 };
 
 /// What becomes of a cell.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome(u16);
 
 impl Outcome {
@@ -14,6 +15,13 @@ impl Outcome {
     const MADE: u16 = 1 << 14;
     /// Sheets of it may be joined by a tunnel.
     const TUNNEL: u16 = 1 << 15;
+    /// That of the case without inside corners.
+    pub(super) const NONE: Self = Self(0);
+
+    /// Whether it is anything else than the triangles of this case.
+    pub(super) const fn differs_from(self, case: CaseIndex) -> bool {
+        self.0 != case.0 as u16
+    }
 
     pub(super) const fn is_made(self) -> bool {
         self.0 & Self::MADE != 0
@@ -58,10 +66,9 @@ pub(super) const fn ambiguous_faces(case: CaseIndex) -> u8 {
     AMBIGUOUS_FACES[case.0 as usize]
 }
 
-/// What becomes of a case; bit `n` of `number` is set where the inside corners of the `n`th of its ambiguous faces are
-/// joined.
-pub(super) const fn outcome(case: CaseIndex, number: usize) -> Outcome {
-    OUTCOMES[FIRST[case.0 as usize] as usize + number]
+/// What becomes of a case; `joined`: a bit for each of its ambiguous faces whose inside corners are joined.
+pub(super) const fn outcome(case: CaseIndex, joined: u8) -> Outcome {
+    OUTCOMES[case.0 as usize][joined as usize % 64]
 }
 
 /// The corners of each face, around it.
@@ -91,35 +98,30 @@ static AMBIGUOUS_FACES: [u8; 256] = {
     all
 };
 
-static FIRST: [u16; 256] = TABLE.first;
-static OUTCOMES: [Outcome; ROOM] = TABLE.outcomes;
-
-/// At least as many as there are outcomes, and extra codes.
-const ROOM: usize = 1024;
+static OUTCOMES: [[Outcome; 64]; 256] = TABLE.outcomes;
 
 struct Table {
-    /// Of each case, where its outcomes begin.
-    first: [u16; 256],
-    outcomes: [Outcome; ROOM],
-    extra: [Extra; ROOM],
+    /// Of sets of faces that are not all ambiguous, they mean nothing.
+    outcomes: [[Outcome; 64]; 256],
+    /// The first `extras` count.
+    extra: [Extra; 256],
     extras: usize,
 }
 
 const TABLE: Table = {
     let mut table = Table {
-        first: [0; 256],
-        outcomes: [Outcome(0); ROOM],
-        extra: [Extra { case: CaseIndex(0), joined: 0 }; ROOM],
+        outcomes: [[Outcome::NONE; 64]; 256],
+        extra: [Extra { case: CaseIndex(0), joined: 0 }; 256],
         extras: 0,
     };
-    let (mut case, mut len) = (0, 0);
+    let mut case = 0;
     while case < 256 {
-        table.first[case] = len as u16;
-        let (faces, mut number) = (AMBIGUOUS_FACES[case], 0);
-        while number < 1 << faces.count_ones() {
-            table.outcomes[len] = table.decided(CaseIndex(case as u8), spread(number, faces));
-            len += 1;
-            number += 1;
+        let mut joined = 0;
+        while joined < 64 {
+            if joined & !AMBIGUOUS_FACES[case] == 0 {
+                table.outcomes[case][joined as usize] = table.decided(CaseIndex(case as u8), joined);
+            }
+            joined += 1;
         }
         case += 1;
     }
@@ -138,21 +140,8 @@ impl Table {
         }
         self.extra[self.extras] = Extra { case, joined };
         self.extras += 1;
-        Outcome((super::super::triangles::FIRST_EXTRA as usize + self.extras - 1) as u16 | tunnel)
+        Outcome((FIRST_EXTRA as usize + self.extras - 1) as u16 | tunnel)
     }
-}
-
-/// Moves bit `n` of `number` to the `n`th of the bits in `mask`.
-const fn spread(number: u8, mask: u8) -> u8 {
-    let (mut spread, mut place, mut bit) = (0, 0, 0);
-    while bit < 8 {
-        if mask >> bit & 1 == 1 {
-            spread |= (number >> place & 1) << bit;
-            place += 1;
-        }
-        bit += 1;
-    }
-    spread
 }
 
 /// Whether the trilinear interpolant can join two of these loops by a tunnel: two loops, but of two of three crossings only
