@@ -180,16 +180,17 @@ impl Exact {
         for index in 0..changed {
             let Decided { place, joined, outcome } = self.decided[index];
             let [x, y] = [self.x[usize::from(place)], self.y[usize::from(place)]];
-            let weights = weights(lattice, planes, settings, x, y);
-            let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
-            let change = if waist.is_some() || outcome.is_made() {
-                let cell = Open { lattice, planes, settings, x, y, case: case_of(&weights), weights };
-                let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len() as u32);
-                made += cell.make(joined, waist, &mut self.triangles, bounds, out);
-                Change::Made { first_interior, triangles: [start, self.triangles.len() as u32 - start] }
-            } else {
-                Change::Code(outcome.code())
-            };
+            let mut change = Change::Code(outcome.code());
+            if outcome.is_made() || outcome.may_have_tunnel() {
+                let weights = weights(lattice, planes, settings, x, y);
+                let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
+                if waist.is_some() || outcome.is_made() {
+                    let cell = Open { lattice, planes, settings, x, y, case: case_of(&weights), weights };
+                    let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len() as u32);
+                    made += cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
+                    change = Change::Made { first_interior, triangles: [start, self.triangles.len() as u32 - start] };
+                }
+            }
             let word = y as usize * lattice.words + x as usize / 64;
             self.cells.push(ExactCell { word, bit: x % 64, change });
         }

@@ -4,79 +4,82 @@ use alloc::vec::Vec;
 
 use super::{
     Open,
+    table::{FIRST_INTERIOR, Outcome, Sheets},
     tunnel::{RING, Strip, Waist, ring, spaced, straightened, strip},
 };
 use crate::{
     buffer::MeshBuffer,
-    cases::{Loops, fan_apex},
+    cases::Loops,
     cell::{CaseIndex, Edge},
     math::sqrt_f64,
     mesher::{output::Bounds, vertices::crossing_fraction},
     sample::Weight,
 };
 
-/// The name of the first vertex in a cell's interior, behind those on its edges.
-const FIRST_INTERIOR: u8 = 12;
-
 /// Vertices in the middle of a disc stay this far from the faces of the cell.
 const LEAST_DEPTH: f64 = 1.0 / 16.0;
 
 impl<W: Weight> Open<'_, W> {
-    /// Makes the cell's vertices in its interior and appends the cell's triangles. Returns how many vertices there are.
+    /// Makes the cell's vertices in its interior and appends the cell's triangles: a tunnel's where there is a waist and
+    /// it can be told what is to be joined, and those of `outcome` otherwise. Returns how many vertices there are.
     #[cold]
     #[inline(never)]
     pub(super) fn make(
         &self,
         joined: u8,
+        outcome: Outcome,
         waist: Option<Waist>,
         triangles: &mut Vec<[u8; 3]>,
         bounds: &mut Bounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        let loops = Loops::new(self.case, joined);
         let field = Trilinear::new(&self.weights);
-        let crossings = self.crossings();
-        let mut names = FIRST_INTERIOR..;
-        let mut vertex = |at| {
-            self.vertex(&field, at, bounds, out);
-            names.next().unwrap_or_default()
+        let Some(tunnel) = waist.and_then(|waist| Tunnel::new(self.case, joined, &field, waist)) else {
+            let sheets =
+                if outcome.is_made() { *outcome.sheets() } else { Sheets::new(&Loops::new(self.case, joined), 0) };
+            return self.add_sheets(&sheets, 0, &field, triangles, bounds, out);
         };
-        let tunnel = waist.and_then(|waist| Tunnel::new(self.case, &loops, &field, waist));
-        if let Some(tunnel) = &tunnel {
-            for corner in tunnel.ring {
-                vertex(corner);
-            }
-            triangles.extend(tunnel.strips.iter().flat_map(Strip::triangles));
+        for corner in tunnel.ring {
+            self.vertex(&field, corner, bounds, out);
         }
-        for number in (0..loops.count).filter(|number| tunnel.as_ref().is_none_or(|t| !t.loops.contains(number))) {
-            let around = loops.get(number);
-            let len = around.len();
-            let name = |index: usize| around[index % len].index() as u8;
-            if let Some(apex) = fan_apex(around) {
-                triangles.extend((1..len - 1).map(|step| [name(apex), name(apex + step), name(apex + step + 1)]));
-            } else {
-                let middle = vertex(field.middle_of(around, &crossings));
-                triangles.extend((0..len).map(|index| [middle, name(index), name(index + 1)]));
-            }
-        }
-        u64::from(names.start - FIRST_INTERIOR)
+        triangles.extend(tunnel.strips.iter().flat_map(Strip::triangles));
+        RING as u64 + self.add_sheets(&tunnel.others, RING as u8, &field, triangles, bounds, out)
     }
 
-    /// Where the surface crosses the cell's edges; 0 on others.
-    fn crossings(&self) -> [[f64; 3]; 12] {
+    /// Appends triangles; returns how many vertices there are in the interior, behind `before` others.
+    fn add_sheets(
+        &self,
+        sheets: &Sheets,
+        before: u8,
+        field: &Trilinear,
+        triangles: &mut Vec<[u8; 3]>,
+        bounds: &mut Bounds,
+        out: &mut MeshBuffer,
+    ) -> u64 {
+        let name = |corner: u8| if corner < FIRST_INTERIOR { corner } else { corner + before };
+        triangles.extend(sheets.triangles().iter().map(|triangle| triangle.map(name)));
+        if sheets.rim().is_empty() {
+            return 0;
+        }
+        let mut mean = [0.0; 3];
+        for &edge in sheets.rim() {
+            let crossing = self.crossing(edge);
+            mean = [0, 1, 2].map(|axis| mean[axis] + crossing[axis] / sheets.rim().len() as f64);
+        }
+        self.vertex(field, field.nearest_to(mean), bounds, out);
+        1
+    }
+
+    /// Where the surface crosses an edge.
+    fn crossing(&self, edge: Edge) -> [f64; 3] {
         let at = self.lattice.index(self.x, self.y);
-        let weight =
-            |corner: usize| self.planes.slabs[1 + corner / 4][at + corner % 2 + corner / 2 % 2 * self.lattice.stride];
-        Edge::ALL.map(|edge| {
-            let [low, high] = edge.corners();
-            let mut crossing = low.offset().map(f64::from);
-            if self.case.crosses(edge) {
-                let isovalue = self.settings.isovalue * W::SCALE;
-                crossing[edge.axis()] =
-                    f64::from(crossing_fraction(weight(low.index()), weight(high.index()), isovalue));
-            }
-            crossing
-        })
+        let [low, high] = edge.corners().map(|corner| {
+            let [x, y, z] = corner.offset().map(usize::from);
+            self.planes.slabs[1 + z][at + x + y * self.lattice.stride]
+        });
+        let mut crossing = edge.corners()[0].offset().map(f64::from);
+        crossing[edge.axis()] = f64::from(crossing_fraction(low, high, self.settings.isovalue * W::SCALE));
+        crossing
     }
 
     /// Appends a vertex to the mesh. `at`: in the cell.
@@ -127,17 +130,20 @@ impl Trilinear {
         crossing
     }
 
-    fn gradient(&self, at: [f64; 3]) -> [f64; 3] {
-        core::array::from_fn(|axis| {
-            let [mut low, mut high] = [at; 2];
-            (low[axis], high[axis]) = (0.0, 1.0);
-            self.at(high) - self.at(low)
-        })
+    /// The value and the gradient at a point.
+    fn at_with_gradient(&self, [x, y, z]: [f64; 3]) -> (f64, [f64; 3]) {
+        let between = |from: f64, to: f64, t: f64| from + (to - from) * t;
+        let [a, b, c, d, e, f, g, h] = self.0;
+        let along_x = between(between(b - a, d - c, y), between(f - e, h - g, y), z);
+        let [a, c, e, g] = [between(a, b, x), between(c, d, x), between(e, f, x), between(g, h, x)];
+        let along_y = between(c - a, g - e, z);
+        let [low, high] = [between(a, c, y), between(e, g, y)];
+        (between(low, high, z), [along_x, along_y, high - low])
     }
 
     /// The direction in which the weights grow; up where they do not.
     fn normal(&self, at: [f64; 3]) -> [f32; 3] {
-        let gradient = self.gradient(at);
+        let (_, gradient) = self.at_with_gradient(at);
         let largest = gradient.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
         if largest == 0.0 {
             return [0.0, 0.0, 1.0];
@@ -147,12 +153,10 @@ impl Trilinear {
         [x, y, z].map(|v| (v / length) as f32)
     }
 
-    /// A point within a loop of crossings, near the surface: their mean, moved along the gradient.
-    fn middle_of(&self, around: &[Edge], crossings: &[[f64; 3]; 12]) -> [f64; 3] {
-        let mut point = [0, 1, 2]
-            .map(|axis| around.iter().map(|edge| crossings[edge.index()][axis]).sum::<f64>() / around.len() as f64);
+    /// Moves a point along the gradient, to the surface or near it.
+    fn nearest_to(&self, mut point: [f64; 3]) -> [f64; 3] {
         for _ in 0..4 {
-            let (value, gradient) = (self.at(point), self.gradient(point));
+            let (value, gradient) = self.at_with_gradient(point);
             let step = value / gradient.iter().map(|v| v * v).sum::<f64>();
             if !step.is_finite() {
                 break;
@@ -165,16 +169,18 @@ impl Trilinear {
 
 /// Two loops whose sheets are one, and the ring between them.
 struct Tunnel {
-    loops: [usize; 2],
     /// Where the ring's corners are, in order.
     ring: [[f64; 3]; RING],
     /// The strips between the loops and the ring, whose corners are the first vertices in the interior.
     strips: [Strip; 2],
+    /// What the other loops bound.
+    others: Sheets,
 }
 
 impl Tunnel {
     /// `None` where it cannot be told what is to be joined.
-    fn new(case: CaseIndex, loops: &Loops, field: &Trilinear, waist: Waist) -> Option<Self> {
+    fn new(case: CaseIndex, joined: u8, field: &Trilinear, waist: Waist) -> Option<Self> {
+        let loops = &Loops::new(case, joined);
         let corner = |corner: usize, waist: &Waist| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
         // On the ring the interpolant is about 0. What the tunnel goes around is farthest from that.
         let through = |end: usize| field.at(corner(end, &waist)) + field.at(corner(end ^ 7, &waist));
@@ -208,7 +214,11 @@ impl Tunnel {
             (one, other) => one.or(other)?,
         };
         let waist = spaced(waist);
-        Some(Self { loops: joined, ring: ring(end).map(|end| corner(end, &waist)), strips: [first, second] })
+        Some(Self {
+            ring: ring(end).map(|end| corner(end, &waist)),
+            strips: [first, second],
+            others: Sheets::new(loops, 1 << joined[0] | 1 << joined[1]),
+        })
     }
 }
 

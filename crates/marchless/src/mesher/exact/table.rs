@@ -1,7 +1,7 @@
 //! What becomes of each case once its faces are decided, derived at compile time.
 
 use crate::{
-    cases::{Loops, triangulate},
+    cases::{Loops, fan_apex, triangulate},
     cell::{CaseIndex, Edge, Face},
     mesher::triangles::FIRST_EXTRA,
 };
@@ -34,6 +34,70 @@ impl Outcome {
     /// The code of its triangles, where it is neither made nor has a tunnel.
     pub(super) const fn code(self) -> u16 {
         self.0 & !(Self::MADE | Self::TUNNEL)
+    }
+
+    /// Its triangles, where it is made.
+    pub(super) fn sheets(self) -> &'static Sheets {
+        &SHEETS[usize::from(self.code()) % SHEETS.len()]
+    }
+}
+
+/// The triangles of a cell without those of a tunnel: fans around crossings, and one disc around a vertex in the interior
+/// where a loop has no fan.
+#[derive(Clone, Copy)]
+pub(super) struct Sheets {
+    /// The first `count` count. Corners are edges, and [`FIRST_INTERIOR`] is the disc's middle.
+    triangles: [[u8; 3]; 12],
+    count: u8,
+    /// The disc's rim, of which the first `rim_len` count.
+    rim: [Edge; 12],
+    rim_len: u8,
+}
+
+/// The name of the first vertex in a cell's interior, behind those on its edges.
+pub(super) const FIRST_INTERIOR: u8 = 12;
+
+impl Sheets {
+    const NONE: Self = Self { triangles: [[0; 3]; 12], count: 0, rim: [Edge::ALL[0]; 12], rim_len: 0 };
+
+    /// The sheets of these loops, but for those whose bits are set in `left_out`.
+    pub(super) const fn new(loops: &Loops, left_out: u8) -> Self {
+        let (mut sheets, mut number) = (Self::NONE, 0);
+        while number < loops.count {
+            if left_out >> number & 1 == 0 {
+                sheets.add(loops.get(number));
+            }
+            number += 1;
+        }
+        sheets
+    }
+
+    const fn add(&mut self, around: &[Edge]) {
+        let len = around.len();
+        let (middle, mut step, end) = match fan_apex(around) {
+            Some(apex) => (around[apex].index() as u8, apex + 1, apex + len - 1),
+            None => {
+                assert!(self.rim_len == 0, "at most one loop of a cell has no fan");
+                self.rim_len = len as u8;
+                self.rim.split_at_mut(len).0.copy_from_slice(around);
+                (FIRST_INTERIOR, 0, len)
+            }
+        };
+        while step < end {
+            let [from, to] = [around[step % len].index() as u8, around[(step + 1) % len].index() as u8];
+            self.triangles[self.count as usize] = [middle, from, to];
+            self.count += 1;
+            step += 1;
+        }
+    }
+
+    pub(super) fn triangles(&self) -> &[[u8; 3]] {
+        &self.triangles[..usize::from(self.count)]
+    }
+
+    /// The crossings around the vertex in the interior, if there is one.
+    pub(super) fn rim(&self) -> &[Edge] {
+        &self.rim[..usize::from(self.rim_len)]
     }
 }
 
@@ -99,6 +163,7 @@ static AMBIGUOUS_FACES: [u8; 256] = {
 };
 
 static OUTCOMES: [[Outcome; 64]; 256] = TABLE.outcomes;
+static SHEETS: [Sheets; TABLE.made] = *TABLE.sheets.split_at(TABLE.made).0.first_chunk().unwrap();
 
 struct Table {
     /// Of sets of faces that are not all ambiguous, they mean nothing.
@@ -106,6 +171,9 @@ struct Table {
     /// The first `extras` count.
     extra: [Extra; 256],
     extras: usize,
+    /// The first `made` count.
+    sheets: [Sheets; 512],
+    made: usize,
 }
 
 const TABLE: Table = {
@@ -113,6 +181,8 @@ const TABLE: Table = {
         outcomes: [[Outcome::NONE; 64]; 256],
         extra: [Extra { case: CaseIndex(0), joined: 0 }; 256],
         extras: 0,
+        sheets: [Sheets::NONE; 512],
+        made: 0,
     };
     let mut case = 0;
     while case < 256 {
@@ -136,7 +206,9 @@ impl Table {
             return Outcome(case.0 as u16 | tunnel);
         }
         if triangulate(&loops).is_none() {
-            return Outcome(Outcome::MADE | tunnel);
+            self.sheets[self.made] = Sheets::new(&loops, 0);
+            self.made += 1;
+            return Outcome((self.made - 1) as u16 | Outcome::MADE | tunnel);
         }
         self.extra[self.extras] = Extra { case, joined };
         self.extras += 1;

@@ -12,7 +12,7 @@
 //! Two roots may be as close as floating point allows. The ring's corners are kept apart and away from the faces, and
 //! since its sides run along the axes, none can be in line with a crossing on an edge: no triangle has zero area.
 
-use super::super::vertices::MARGIN;
+use crate::{math::sqrt_f64, mesher::vertices::MARGIN};
 
 /// The box around a tunnel's waist: from and to, per axis, in the cell's coordinates.
 pub(super) type Waist = [[f64; 2]; 3];
@@ -33,26 +33,23 @@ pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
     for (axis, ends) in waist.iter_mut().enumerate() {
         let [u, v] = [1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3)];
         let [low, high] = [0, 1 << axis].map(|side| [0, u, u | v, v].map(|corner| weights[corner | side]));
-        let slope: [f64; 4] = core::array::from_fn(|corner| high[corner] - low[corner]);
-        let a = slope[0] * slope[2] - slope[1] * slope[3];
-        let b = low[0] * slope[2] + low[2] * slope[0] - low[1] * slope[3] - low[3] * slope[1];
-        let c = low[0] * low[2] - low[1] * low[3];
-        *ends = roots_within(a, b, c)?;
+        let determinant = |a: &[f64; 4], b: &[f64; 4]| a[0] * b[2] - a[1] * b[3];
+        let mixed = determinant(&low, &high) + determinant(&high, &low);
+        *ends = roots_within(determinant(&low, &low), mixed, determinant(&high, &high))?;
     }
     Some(waist)
 }
 
-/// The two roots of `a·t² + b·t + c`, where both lie between 0 and 1 and are not the same.
+/// The two roots of `a·(1 − t)² + b·(1 − t)·t + c·t²`, where both lie between 0 and 1 and are not the same.
 fn roots_within(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
-    let discriminant = b * b - 4.0 * a * c;
     // NaN makes every comparison false.
-    let on_one_side = a * c > 0.0 && a * (a + b + c) > 0.0;
-    let turns_within = a * b < 0.0 && b.abs() < 2.0 * a.abs();
-    if !(discriminant > 0.0 && discriminant < f64::INFINITY && on_one_side && turns_within) {
+    let discriminant = b * b - 4.0 * a * c;
+    if !(a * c > 0.0 && a * b < 0.0 && discriminant > 0.0 && discriminant < f64::INFINITY) {
         return None;
     }
-    let larger = -0.5 * (b + crate::math::sqrt_f64(discriminant).copysign(b));
-    let (first, second) = (c / larger, larger / a);
+    // Of the quotient t / (1 − t).
+    let larger = -0.5 * (b + sqrt_f64(discriminant).copysign(b));
+    let [first, second] = [a / larger, larger / c].map(|quotient| quotient / (1.0 + quotient));
     let (from, to) = (first.min(second), first.max(second));
     (from > LEAST_ROOM && to < 1.0 - LEAST_ROOM).then_some([from, to])
 }
