@@ -192,27 +192,22 @@ impl Tunnel {
         let (mut corners_backward, mut names_backward): ([[f64; 3]; RING], [u8; RING]) = (corners, names);
         corners_backward.reverse();
         names_backward.reverse();
-        let strip_to = |number: usize, forward: bool| {
+        let ring_turn = turn(&corners, end);
+        let strip_to = |number: usize| {
             let (mut around, mut around_names) = ([[0.0; 3]; 12], [0; 12]);
             let edges = loops.get(number);
             for (index, &edge) in edges.iter().enumerate() {
                 (around[index], around_names[index]) = (straightened(field.crossing(edge), &waist), edge.index() as u8);
             }
+            let around = &around[..edges.len()];
+            let forward = turn(around, end) * ring_turn > 0.0;
             let ring = if forward { (&corners, &names) } else { (&corners_backward, &names_backward) };
-            strip((&around[..edges.len()], ring.0), (&around_names[..edges.len()], ring.1))
+            Some((forward, strip((around, ring.0), (&around_names[..edges.len()], ring.1))?))
         };
-        // One loop turns as the ring does, and the other against it.
-        let pair = |forward: bool| strip_to(joined[0], forward).zip(strip_to(joined[1], !forward));
-        let ((_, first), (_, second)) = match (pair(true), pair(false)) {
-            (Some(one), Some(other)) => {
-                if one.0.0 + one.1.0 <= other.0.0 + other.1.0 {
-                    one
-                } else {
-                    other
-                }
-            }
-            (one, other) => one.or(other)?,
-        };
+        let ((forward, first), (other_forward, second)) = (strip_to(joined[0])?, strip_to(joined[1])?);
+        if forward == other_forward {
+            return None;
+        }
         let waist = spaced(waist);
         Some(Self {
             ring: ring(end).map(|end| corner(end, &waist)),
@@ -220,6 +215,18 @@ impl Tunnel {
             others: Sheets::new(loops, 1 << joined[0] | 1 << joined[1]),
         })
     }
+}
+
+/// How points of a straightened cell, joined in order, turn around the cell's diagonal from corner `end`: positive one way,
+/// negative the other.
+fn turn(points: &[[f64; 3]], end: usize) -> f64 {
+    let from_middle = |index: usize| points[index % points.len()].map(|v| v - 0.5);
+    let diagonal: [f64; 3] = core::array::from_fn(|axis| if end >> axis & 1 == 1 { -1.0 } else { 1.0 });
+    let area = |index: usize| {
+        let ([a, b, c], [d, e, f]) = (from_middle(index), from_middle(index + 1));
+        diagonal[0] * (b * f - c * e) + diagonal[1] * (c * d - a * f) + diagonal[2] * (a * e - b * d)
+    };
+    (0..points.len()).map(area).sum()
 }
 
 /// The two loops that a tunnel joins. `goes_around_inside`: what is within the tunnel.

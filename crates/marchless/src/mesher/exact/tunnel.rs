@@ -29,29 +29,49 @@ const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
 /// The waist of the tunnel between the sheets of a cell with these weights at its corners, where there are several
 /// sheets and two are joined.
 pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
-    let mut waist = [[0.0; 2]; 3];
-    for (axis, ends) in waist.iter_mut().enumerate() {
+    let parabolas = [0, 1, 2].map(|axis| {
         let [u, v] = [1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3)];
         let [low, high] = [0, 1 << axis].map(|side| [0, u, u | v, v].map(|corner| weights[corner | side]));
         let determinant = |a: &[f64; 4], b: &[f64; 4]| a[0] * b[2] - a[1] * b[3];
         let mixed = determinant(&low, &high) + determinant(&high, &low);
-        *ends = roots_within(determinant(&low, &low), mixed, determinant(&high, &high))?;
+        Parabola { low: determinant(&low, &low), mixed, high: determinant(&high, &high) }
+    });
+    // All at once: which of them fails first is anyone's guess.
+    if parabolas.iter().fold(true, |all, parabola| all & parabola.has_roots_within()) {
+        let waist = parabolas.map(|parabola| parabola.roots());
+        let has_room = |&[from, to]: &[f64; 2]| from > LEAST_ROOM && to < 1.0 - LEAST_ROOM;
+        return waist.iter().all(has_room).then_some(waist);
     }
-    Some(waist)
+    None
 }
 
-/// The two roots of `a·(1 − t)² + b·(1 − t)·t + c·t²`, where both lie between 0 and 1 and are not the same.
-fn roots_within(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
-    // NaN makes every comparison false.
-    let discriminant = b * b - 4.0 * a * c;
-    if !(a * c > 0.0 && a * b < 0.0 && discriminant > 0.0 && discriminant < f64::INFINITY) {
-        return None;
+/// `low·(1 − t)² + mixed·(1 − t)·t + high·t²`
+#[derive(Clone, Copy)]
+struct Parabola {
+    low: f64,
+    mixed: f64,
+    high: f64,
+}
+
+impl Parabola {
+    const fn discriminant(&self) -> f64 {
+        self.mixed * self.mixed - 4.0 * self.low * self.high
     }
-    // Of the quotient t / (1 − t).
-    let larger = -0.5 * (b + sqrt_f64(discriminant).copysign(b));
-    let [first, second] = [a / larger, larger / c].map(|quotient| quotient / (1.0 + quotient));
-    let (from, to) = (first.min(second), first.max(second));
-    (from > LEAST_ROOM && to < 1.0 - LEAST_ROOM).then_some([from, to])
+
+    /// Whether there are two roots, and both lie between 0 and 1. NaN makes every comparison false.
+    const fn has_roots_within(&self) -> bool {
+        let Self { low, mixed, high } = *self;
+        let discriminant = self.discriminant();
+        (low * high > 0.0) & (low * mixed < 0.0) & (discriminant > 0.0) & (discriminant < f64::INFINITY)
+    }
+
+    /// The roots, the lower first.
+    fn roots(&self) -> [f64; 2] {
+        // Of the quotient t / (1 − t).
+        let larger = -0.5 * (self.mixed + sqrt_f64(self.discriminant()).copysign(self.mixed));
+        let [first, second] = [self.low / larger, larger / self.high].map(|quotient| quotient / (1.0 + quotient));
+        [first.min(second), first.max(second)]
+    }
 }
 
 /// The waist with its ends apart from each other and from the faces of the cell.
@@ -86,12 +106,12 @@ pub(super) fn straightened(point: [f64; 3], waist: &Waist) -> [f64; 3] {
 
 /// Joins a loop of crossings to the ring, both given in the same sense of rotation: the triangles between them with the
 /// least sum of squared lengths of the lines from one to the other, among those that join the first crossing to the
-/// nearest corner of the ring, and that sum. Corners get these names. `None` where all of the ring would hang on one
+/// nearest corner of the ring. Corners get these names. `None` where all of the ring would hang on one
 /// crossing, so that a line would be there twice.
 pub(super) fn strip(
     (around, ring): (&[[f64; 3]], &[[f64; 3]; RING]),
     (around_names, ring_names): (&[u8], &[u8; RING]),
-) -> Option<(f64, Strip)> {
+) -> Option<Strip> {
     let len = around.len();
     let distance = |i: usize, j: usize| squared_distance(around[i % len], ring[j % RING]);
     let start = (0..RING).min_by(|&a, &b| distance(0, a).total_cmp(&distance(0, b)))?;
@@ -121,7 +141,7 @@ pub(super) fn strip(
             strip.push([inner, ring_names[(start + j) % RING], outer]);
         }
     }
-    (held_by.count_ones() > 1).then_some((sums[len][RING], strip))
+    (held_by.count_ones() > 1).then_some(strip)
 }
 
 /// The triangles between a loop and a ring.
