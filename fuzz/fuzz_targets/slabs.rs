@@ -6,8 +6,8 @@ use libfuzzer_sys::{
     arbitrary::{Arbitrary, Result, Unstructured},
     fuzz_target,
 };
-use marchless::{MeshBuffer, MeshError, Mesher, Samples, SlabMesher};
-use marchless_fuzz::{AnyVolume, Bits, FuzzWeight, Volume};
+use marchless::{MeshBuffer, MeshError, MeshSettings, Mesher, Samples, SlabMesher};
+use marchless_fuzz::{AnyVolume, Bits, FuzzWeight, TOPOLOGIES, Volume};
 
 /// What happens before each slab; repeated where there are more slabs.
 #[derive(Debug)]
@@ -37,10 +37,16 @@ fuzz_target!(|input: Input| {
 });
 
 fn check<W: FuzzWeight>(any_size: [u32; 2], steps: &[Step], volume: &Volume<W>) {
-    check_size(any_size, volume);
+    for settings in TOPOLOGIES.map(|topology| volume.settings(topology)) {
+        check_size::<W>(any_size, &settings);
+        check_slabs(steps, volume, &settings);
+    }
+}
+
+fn check_slabs<W: FuzzWeight>(steps: &[Step], volume: &Volume<W>, settings: &MeshSettings) {
     let [nx, ny, nz] = volume.shape.size();
     let (size, len) = ([nx, ny], (nx * ny) as usize);
-    let Some(mut mesher) = check_size(size, volume) else { return };
+    let Some(mut mesher) = check_size(size, settings) else { return };
 
     let (mut piece, mut streamed) = (MeshBuffer::new(), MeshBuffer::new());
     for (slab, step) in volume.weights.chunks_exact(len).zip(steps.iter().cycle()) {
@@ -67,14 +73,14 @@ fn check<W: FuzzWeight>(any_size: [u32; 2], steps: &[Step], volume: &Volume<W>) 
     finished.expect("there are slabs enough");
     let mut whole = MeshBuffer::new();
     let samples = Samples::new(volume.shape, &volume.weights).expect("one weight a sample");
-    Mesher::new().mesh(samples, &volume.settings, &mut whole).expect("the samples can be meshed");
+    Mesher::new().mesh(samples, settings, &mut whole).expect("the samples can be meshed");
     assert_eq!(Bits::of(&streamed), Bits::of(&whole));
 }
 
 /// A mesher of slabs of `size`, where there can be one.
-fn check_size<W: FuzzWeight>(size: [u32; 2], volume: &Volume<W>) -> Option<SlabMesher<W>> {
-    let mesher = SlabMesher::new(size, volume.settings);
-    if !volume.settings.isovalue.is_finite() {
+fn check_size<W: FuzzWeight>(size: [u32; 2], settings: &MeshSettings) -> Option<SlabMesher<W>> {
+    let mesher = SlabMesher::new(size, *settings);
+    if !settings.isovalue.is_finite() {
         assert!(matches!(mesher, Err(MeshError::Isovalue { .. })));
     } else if size.iter().any(|&size| size < 2) {
         assert_eq!(mesher.as_ref().err(), Some(&MeshError::SlabSize { size }));

@@ -1,12 +1,15 @@
 //! What the fuzz targets share: volumes made from a fuzzer's bytes, and meshes down to the last bit.
 
 use libfuzzer_sys::arbitrary::{Arbitrary, Result, Unstructured};
-use marchless::{MeshBuffer, MeshSettings, Samples, Shape, Weight};
+use marchless::{MeshBuffer, MeshSettings, Samples, Shape, Topology, Weight};
+
+/// Every volume is meshed with both.
+pub const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
 
 /// Samples of a small volume, and how to mesh them.
 #[derive(Clone, Debug)]
 pub struct Volume<W> {
-    /// All samples per axis, padding included: up to 140 along one axis, up to 8 along the others.
+    /// All samples per axis, padding included: up to 140 along one axis, up to 5 along the others.
     pub shape: Shape,
     /// In memory of just their size, so that AddressSanitizer sees a read behind the last one.
     pub weights: Box<[W]>,
@@ -14,8 +17,10 @@ pub struct Volume<W> {
     pub materials: Option<Box<[u8]>>,
     /// Whether the outermost layer is padding.
     pub padded: bool,
-    /// The isovalue is any at all; often one of the weights, often not finite.
-    pub settings: MeshSettings,
+    /// Any at all; often one of the weights, often not finite.
+    pub isovalue: f32,
+    /// Whether to compute normals.
+    pub normals: bool,
 }
 
 impl<W: FuzzWeight> Volume<W> {
@@ -27,11 +32,16 @@ impl<W: FuzzWeight> Volume<W> {
         }
         if self.padded { samples.padded() } else { samples }
     }
+
+    /// How to mesh them.
+    pub fn settings(&self, topology: Topology) -> MeshSettings {
+        MeshSettings { isovalue: self.isovalue, normals: self.normals, topology }
+    }
 }
 
 impl<'a, W: FuzzWeight> Arbitrary<'a> for Volume<W> {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Self> {
-        let mut size = [u.int_in_range(1..=140)?, u.int_in_range(1..=8)?, u.int_in_range(1..=8)?];
+        let mut size = [u.int_in_range(1..=140)?, u.int_in_range(1..=5)?, u.int_in_range(1..=5)?];
         size.rotate_right(u.int_in_range(0..=2)?);
         let shape = Shape::new(size).expect("the size is small");
         let [padded, normals, has_materials, shuffled] = u.arbitrary()?;
@@ -57,7 +67,7 @@ impl<'a, W: FuzzWeight> Arbitrary<'a> for Volume<W> {
             2 => f32::from(iso_bits as i8) / 16.0,
             _ => f32::from_bits(iso_bits),
         };
-        Ok(Self { shape, weights, materials, padded, settings: MeshSettings { isovalue, normals, ..MeshSettings::default() } })
+        Ok(Self { shape, weights, materials, padded, isovalue, normals })
     }
 }
 

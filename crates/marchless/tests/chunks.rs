@@ -15,7 +15,7 @@ const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
 /// A place in the volume, exactly: `f64` holds the sum of a chunk's origin and an `f32` within the chunk.
 type Place = [u64; 3];
 
-/// Where a vertex belongs: twice the coordinates of the lattice point, edge or cell, odd along each axis that it extends
+/// Where a vertex belongs: twice the coordinates of the lattice's edge or cell, odd along each axis that it extends
 /// along.
 type Home = [i32; 3];
 

@@ -1,6 +1,6 @@
-//! Every pattern of signs in one cell, in two neighbours and in 2 × 2 × 1 cells, and ten million of 2 × 2 × 2: the surface is
-//! closed but for its rim in the faces of the box, 2-manifold, consistently oriented and free of anything degenerate,
-//! in both topologies, whatever the values are that have these signs.
+//! Every pattern of signs in one cell, in two neighbours and in 2 × 2 × 1 cells, and ten million of 2 × 2 × 2: the
+//! surface is closed but for its rim in the faces of the box, 2-manifold, consistently oriented and free of anything
+//! degenerate, in both topologies, whatever the values are that have these signs.
 
 #[path = "support/random.rs"]
 mod random;

@@ -63,7 +63,7 @@ impl Digital {
 
     /// The Euler number of the inside.
     pub(crate) fn euler(&self) -> i64 {
-        // The corners of a cube, and of each square, edge and point at its lowest corner, by the axes they extend along.
+        // Corners of a cube, and of each square, edge and point at its lowest corner, by the axes they extend along.
         let corners = |point: [usize; 3], axes: usize| -> Vec<Option<bool>> {
             let offsets = (0..8).filter(|corner| corner & !axes == 0);
             offsets

@@ -1,5 +1,5 @@
-//! The surface of the trilinear interpolant, by refinement: each cell becomes 16 × 16 × 16 small ones, each of those six
-//! simplices, and what is counted are changes of sign. No case, no face rule, no saddle.
+//! The surface of the trilinear interpolant, by refinement: each cell becomes 16 × 16 × 16 small ones, each of those
+//! six simplices, and what is counted are changes of sign. No case, no face rule, no saddle.
 //!
 //! The simplices around a small cell's diagonal from its lowest to its highest corner, one for each order of the axes,
 //! fit from cell to cell (Freudenthal, Kuhn). Where the ends of a simplex edge have different signs, the surface has a

@@ -1,8 +1,8 @@
-//! How near a field's saddles come to the isovalue, zero: where they come too near, no refinement can tell which way the
-//! surface goes. Only for choosing inputs.
+//! How near a field's saddles come to the isovalue, zero: where they come too near, no refinement can tell which way
+//! the surface goes. Only for choosing inputs.
 
-/// How far the saddles of the trilinear interpolant in a cell, on its faces and within, keep away from zero, in parts of
-/// the range of the corners' values.
+/// How far the saddles of the trilinear interpolant in a cell, on its faces and within, keep away from zero, in parts
+/// of the range of the corners' values.
 ///
 /// `corners`: bit 0 of a corner is its x.
 pub(crate) fn distance(corners: &[f64; 8]) -> f64 {
