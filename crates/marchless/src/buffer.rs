@@ -12,7 +12,8 @@ pub struct MeshBuffer {
     pub positions: Vec<[f32; 3]>,
     /// One unit normal a vertex, pointing outside; empty where normals were switched off.
     pub normals: Vec<[f32; 3]>,
-    /// One material a vertex, that of the inside end of its edge; empty where the samples had none.
+    /// One material a vertex, that of the inside end of its edge (in the interior of a cell: of the nearest inside
+    /// corner); empty where the samples had none.
     pub materials: Vec<u8>,
     /// Three a triangle.
     pub indices: Vec<u32>,

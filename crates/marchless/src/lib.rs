@@ -39,7 +39,12 @@
 //!
 //! # Guaranteed
 //! - Within a chunk and across chunks the surface is closed, 2-manifold, consistently oriented and free of zero-area
-//!   triangles, on every input, ties with the isovalue included; vertices on a shared border are equal bit for bit.
+//!   triangles, and every vertex and normal is finite, in both [`Topology`]s and on every input: ties with the isovalue,
+//!   NaN, infinities and subnormal numbers included. Vertices on a shared border are equal bit for bit.
+//! - With [`Topology::Separated`], the default, no two triangles cross, and the surface is that of digital topology: inside
+//!   points are neighbours along the axes, outside points along the diagonals of faces, too.
+//! - With [`Topology::Trilinear`], the surface has the topology of the trilinear interpolant in every cell, as far as
+//!   `f64` tells; where faces are decided by a tie or by weights that are not finite, the inside stays separated.
 //! - The same samples give the same mesh, and the same stamps in the same order the same samples, bit for bit, on any
 //!   machine.
 //! - No samples, stamps, rays or meshes panic: NaN and infinite samples have a meaning ([`Weight`]), and what cannot be
@@ -47,9 +52,33 @@
 //! - [`Mesher::mesh`] and [`Neighbourhood::mesh`] allocate nothing once their buffers are warm.
 //!
 //! # Not guaranteed
-//! - The topology of the trilinear interpolant: on a face whose corners alternate, inside corners are separated.
+//! - That no triangles of [`Topology::Trilinear`] cross: none did in some 20 million random cells with open cases, but
+//!   in cells whose weights are more than 20 orders of magnitude apart two were seen that do.
 //! - Well-shaped triangles: crossings lie where the samples put them, so slivers are common.
 //! - Clean meshes of more than 4,096 cells per axis at once: `f32` positions have no room for the clamp there.
+//!
+//! # Evidence
+//! In how many of 304 generated fields (noise, periodic surfaces, thin sheets, integers with ties, infinities, all
+//! magnitudes; all closed) do meshes have flaws? [`MeshReport`] judges them all; `cargo bench -p marchless_benches --bench
+//! soundness` in the repository reproduces it for the crates, and `benches/peers/soundness.py` for the others.
+//!
+//! | extractor | any flaw | open or non-manifold edges | zero-area triangles | crossing triangles | not finite |
+//! |---|---|---|---|---|---|
+//! | marchless, both topologies | 0 | 0 | 0 | 0 | 0 |
+//! | isomesh 0.0.14, marching cubes | 161 | 0 | 128 | 41 | 32 |
+//! | PyMCubes 0.1.6 | 174 | 0 | 171 | 62 | 32 |
+//! | transvoxel 2.0.0, regular cells | 177 | 0 | 176 | 68 | 32 |
+//! | VTK 9.7.2, flying edges | 177 | 0 | 177 | 65 | 32 |
+//! | VTK 9.7.2, synchronized templates | 88 | 26 | 48 | 40 | 32 |
+//! | scikit-image 0.26.0, Lewiner | 186 | 72 open, 42 not manifold | 174 | 90 | 32 |
+//! | isomesh 0.0.14, its trilinear option | 202 | 2 open, 94 not manifold | 116 | 23 | 32 |
+//! | fast-surface-nets 0.2.1 | 228 | 220 | 44 | 16 | 32 |
+//!
+//! Most flaws come from ties: in the 96 fields without ties and non-finite samples, the first four of the others have none.
+//! Dual methods such as the last are non-manifold by nature where two sheets share a cell.
+//!
+//! The crate's tests mesh every pattern of signs of one, two and 2 × 2 × 1 cells and ten million of 2 × 2 × 2, and
+//! compare both topologies with references that share nothing with the mesher.
 //!
 //! # Features
 //! `std` (default) finds out at run time which instructions the processor has ([`Backend`]), instead of using those

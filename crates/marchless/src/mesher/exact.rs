@@ -4,9 +4,10 @@
 //! 128 of the 256 cases are open: 120 have an ambiguous face, and in the other 8, two corners at the ends of a diagonal
 //! of the cell may be joined through its middle. Word operations find them among all cells. Most are settled by the
 //! faces: the weights of an ambiguous face's corners, multiplied diagonal by diagonal, tell which two are joined (the
-//! asymptotic decider), and the same products come out of both cells at the face. A [table](table) then has the code of
-//! the triangles, as for any other case. Left over are cells of which some loop has no fan or too many triangles, or
-//! whose sheets are joined by a [tunnel](tunnel). Those few are made here one by one, with vertices in their interior.
+//! asymptotic decider), and the same products come out of both cells at the face. A table then has the code of the
+//! triangles, as for any other case. Left over are cells of which some loop has no fan, those of
+//! more than five triangles, and those whose sheets are joined by a tunnel. These few are made one by one, most of them
+//! with vertices in their interior.
 //!
 //! In a face's products, ties and weights that are not finite leave the inside separated, as in all other meshes.
 //!

@@ -9,6 +9,12 @@
 //! those at the ends of one diagonal, lie on the surface, and so do the sides between them: a ring around the tunnel's
 //! waist.
 //!
+//! Between the ring and each of the two loops lies a strip of triangles. Which corner of the ring belongs to which
+//! crossing is told by the order of things along the axes, not by distances: strips of the shortest lines in the cell
+//! as it is cross each other in 2 to 20 % of all tunnels, those of the least area in 14 to 58 %; strips of the shortest
+//! lines in the cell [`straightened`] were not seen to. (Random cells, the first figures with weights of one magnitude,
+//! the second with weights six apart.)
+//!
 //! Two roots may be as close as floating point allows. The ring's corners are kept apart and away from the faces, and
 //! since its sides run along the axes, none can be in line with a crossing on an edge: no triangle has zero area.
 
