@@ -66,7 +66,7 @@
 //! |---|---|---|---|---|---|
 //! | marchless, both topologies | 0 | 0 | 0 | 0 | 0 |
 //! | isomesh 0.0.14, marching cubes | 161 | 0 | 128 | 41 | 32 |
-//! | PyMCubes 0.1.6 | 174 | 0 | 171 | 62 | 32 |
+//! | `PyMCubes` 0.1.6 | 174 | 0 | 171 | 62 | 32 |
 //! | transvoxel 2.0.0, regular cells | 177 | 0 | 176 | 68 | 32 |
 //! | VTK 9.7.2, flying edges | 177 | 0 | 177 | 65 | 32 |
 //! | VTK 9.7.2, synchronized templates | 88 | 26 | 48 | 40 | 32 |

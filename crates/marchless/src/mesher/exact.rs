@@ -228,11 +228,13 @@ const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
 fn weights<W: Weight>(lattice: &Lattice, planes: &Planes<'_, W>, settings: &MeshSettings, x: u32, y: u32) -> [f64; 8] {
     let (at, isovalue) = (lattice.index(x, y), f64::from(settings.isovalue));
     let [_, low, high, _] = planes.slabs;
-    let mut weights = [0.0; 8];
-    for (pair, weights) in weights.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-        let slab = if pair < 2 { low } else { high };
-        let row = &slab[at + pair % 2 * lattice.stride..][..2];
-        *weights = [f64::from(row[0].to_voxels()) - isovalue, f64::from(row[1].to_voxels()) - isovalue];
+    let (a, c) = (&low[at..][..2], &low[at + lattice.stride..][..2]);
+    let (e, g) = (&high[at..][..2], &high[at + lattice.stride..][..2]);
+    let (mut weights, mut corner) =
+        ([a[0], a[1], c[0], c[1], e[0], e[1], g[0], g[1]].map(W::to_voxels).map(f64::from), 0);
+    while corner < 8 {
+        weights[corner] -= isovalue;
+        corner += 1;
     }
     weights
 }
@@ -249,12 +251,15 @@ fn case_of(weights: &[f64; 8]) -> CaseIndex {
 /// A bit for each ambiguous face whose inside corners are joined.
 #[inline(always)]
 fn joined_faces(weights: &[f64; 8], case: CaseIndex) -> u8 {
-    let mut joined = 0;
-    for (face, [a, b, c, d]) in FACE_CORNERS.into_iter().enumerate() {
+    let (mut joined, mut face) = (0, 0);
+    // Written so that the compiler unrolls it.
+    while face < 6 {
+        let [a, b, c, d] = FACE_CORNERS[face];
         let (along, across) = (weights[a] * weights[c], weights[b] * weights[d]);
         let (inside, outside) = if case.0 >> a & 1 == 1 { (along, across) } else { (across, along) };
         // Comparisons with NaN are false.
         joined |= u8::from((inside > outside) & (inside < f64::INFINITY)) << face;
+        face += 1;
     }
     joined & table::ambiguous_faces(case)
 }

@@ -35,15 +35,14 @@ const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
 /// The waist of the tunnel between the sheets of a cell with these weights at its corners, where there are several
 /// sheets and two are joined.
 pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
-    let parabolas = [0, 1, 2].map(|axis| {
-        let [u, v] = [1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3)];
-        let [low, high] = [0, 1 << axis].map(|side| [0, u, u | v, v].map(|corner| weights[corner | side]));
-        let determinant = |a: &[f64; 4], b: &[f64; 4]| a[0] * b[2] - a[1] * b[3];
-        let mixed = determinant(&low, &high) + determinant(&high, &low);
-        Parabola { low: determinant(&low, &low), mixed, high: determinant(&high, &high) }
-    });
+    let [a, b, c, d, e, f, g, h] = *weights;
+    let parabolas = [
+        Parabola::between([a, c, g, e], [b, d, h, f]),
+        Parabola::between([a, e, f, b], [c, g, h, d]),
+        Parabola::between([a, b, d, c], [e, f, h, g]),
+    ];
     // All at once: which of them fails first is anyone's guess.
-    if parabolas.iter().fold(true, |all, parabola| all & parabola.has_roots_within()) {
+    if parabolas[0].has_roots_within() & parabolas[1].has_roots_within() & parabolas[2].has_roots_within() {
         let waist = parabolas.map(|parabola| parabola.roots());
         let has_room = |&[from, to]: &[f64; 2]| from > LEAST_ROOM && to < 1.0 - LEAST_ROOM;
         return waist.iter().all(has_room).then_some(waist);
@@ -60,6 +59,15 @@ struct Parabola {
 }
 
 impl Parabola {
+    /// q between two slices, each given by its corners, around it.
+    const fn between(low: [f64; 4], high: [f64; 4]) -> Self {
+        Self {
+            low: low[0] * low[2] - low[1] * low[3],
+            mixed: low[0] * high[2] - low[1] * high[3] + high[0] * low[2] - high[1] * low[3],
+            high: high[0] * high[2] - high[1] * high[3],
+        }
+    }
+
     const fn discriminant(&self) -> f64 {
         self.mixed * self.mixed - 4.0 * self.low * self.high
     }
