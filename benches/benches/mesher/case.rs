@@ -1,8 +1,8 @@
-//! One field of one size, and our mesher on it.
+//! One field of one size, our mesher on it, and the judge of its mesh.
 
 use core::{cell::OnceCell, hint::black_box};
 
-use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
 use marchless_benches::Field;
 
 /// A field to mesh; sampled when it is first asked for.
@@ -48,14 +48,21 @@ impl Case {
     }
 
     /// Our mesher on weights of type `W`: each call meshes them once, into warm buffers, and counts the triangles.
-    pub(crate) fn ours<W: Weight>(&self, normals: bool) -> impl FnMut() -> usize + use<W> {
+    pub(crate) fn ours<W: Weight>(&self, settings: MeshSettings) -> impl FnMut() -> usize + use<W> {
         let shape = Shape::cube(self.size).expect("the sizes are small");
-        let (weights, settings) = (self.weights::<W>(), MeshSettings { normals, ..MeshSettings::default() });
-        let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
+        let (weights, mut mesher, mut mesh) = (self.weights::<W>(), Mesher::new(), MeshBuffer::new());
         move || {
             let samples = Samples::new(shape, &weights).expect("one weight a sample").padded();
             mesher.mesh(black_box(samples), &settings, &mut mesh).expect("there are cells to mesh");
             black_box(&mesh).triangle_count()
         }
+    }
+
+    /// The judge on our mesh of the `f32` samples: each call examines it once, and counts the triangles.
+    pub(crate) fn report(&self) -> impl FnMut() -> usize + use<> {
+        let (shape, mut mesh) = (Shape::cube(self.size).expect("the sizes are small"), MeshBuffer::new());
+        let samples = Samples::new(shape, self.distances()).expect("one weight a sample").padded();
+        Mesher::new().mesh(samples, &MeshSettings::default(), &mut mesh).expect("there are cells to mesh");
+        move || MeshReport::new(black_box(&mesh.positions), &mesh.indices).triangles
     }
 }

@@ -9,6 +9,11 @@
 //! - isomesh (marching cubes) and isosurface (0.0.4, marching cubes) ask a function for each sample; see `peers.rs`.
 //! - For fields without a surface, reading the samples once (all of them, xor) is what nobody can undercut by much.
 //!
+//! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the default,
+//! and on caves `MeshReport` judges the mesh. These alone take some 40 seconds:
+//!
+//! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear)?$|MeshReport)'`
+//!
 //! Terrains of 1³ to 50³ cells are those of William Svoboda, "Improving the Marching Cubes Algorithm for Use in
 //! Deformable 3D Terrain", table 1, whose times (C#, an Intel Core i5 of 3.5 GHz, no shared vertices) the table repeats
 //! for scale: another machine, another terrain.
@@ -27,6 +32,7 @@ use core::{hint::black_box, time::Duration};
 use std::{env, process::ExitCode};
 
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, measurement::WallTime};
+use marchless::{MeshSettings, Topology};
 use marchless_benches::Field;
 
 use case::Case;
@@ -77,7 +83,12 @@ fn fields(criterion: &mut Criterion, results: &mut Results, case: &Case) {
     ours::<i8>(&mut group, results, case);
     ours::<i16>(&mut group, results, case);
     ours::<f32>(&mut group, results, case);
-    results.measure(&mut group, case, Subject::Bare, || case.ours::<f32>(false));
+    results.measure(&mut group, case, Subject::Bare, || {
+        case.ours::<f32>(MeshSettings { normals: false, ..MeshSettings::default() })
+    });
+    if case.field == Field::Caves && case.size <= 128 {
+        results.measure(&mut group, case, Subject::Report, || case.report());
+    }
     let nets = |normalise| peers::nets(case.size, case.distances().to_vec(), normalise);
     results.measure(&mut group, case, Subject::Nets, || nets(false));
     if case.size < 128 {
@@ -109,9 +120,15 @@ fn open<'a>(criterion: &'a mut Criterion, case: &Case) -> BenchmarkGroup<'a, Wal
     group
 }
 
-/// Ours on weights of type `W`; where there is no surface, also what it takes only to read them.
+/// Ours on weights of type `W`; on fields of noise with either topology, and where there is no surface, also what it
+/// takes only to read them.
 fn ours<W: Measured>(group: &mut BenchmarkGroup<'_, WallTime>, results: &mut Results, case: &Case) {
-    results.measure(group, case, Subject::Ours(W::NAME), || case.ours::<W>(true));
+    results.measure(group, case, Subject::Ours(W::NAME), || case.ours::<W>(MeshSettings::default()));
+    if matches!(case.field, Field::Terrain | Field::Caves | Field::WhiteNoise) && [35, 64, 128].contains(&case.size) {
+        results.measure(group, case, Subject::Trilinear(W::NAME), || {
+            case.ours::<W>(MeshSettings { topology: Topology::Trilinear, ..MeshSettings::default() })
+        });
+    }
     if matches!(case.field, Field::Empty | Field::Solid) {
         results.measure(group, case, Subject::Reading(W::NAME), || {
             let weights = case.weights::<W>();

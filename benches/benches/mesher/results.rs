@@ -16,6 +16,10 @@ use crate::case::Case;
 pub(crate) enum Subject {
     /// Ours with normals, on weights of this name.
     Ours(&'static str),
+    /// The same with `Topology::Trilinear`.
+    Trilinear(&'static str),
+    /// `MeshReport` on our mesh of the `f32` samples.
+    Report,
     /// Ours without normals, on `f32`.
     Bare,
     /// fast-surface-nets on `f32`.
@@ -34,6 +38,8 @@ impl fmt::Display for Subject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Ours(weight) => write!(f, "marchless {weight}"),
+            Self::Trilinear(weight) => write!(f, "marchless {weight}, Trilinear"),
+            Self::Report => f.write_str("MeshReport"),
             Self::Bare => f.write_str("marchless f32 without normals"),
             Self::Nets => f.write_str("fast-surface-nets f32"),
             Self::NetsNormalised => f.write_str("fast-surface-nets f32, normalised"),
@@ -174,6 +180,12 @@ impl Results {
             let mut notes = Vec::new();
             if let Some(factor) = factor(Subject::Reading(weight)) {
                 notes.push(format!("{:.1} times reading", 1.0 / factor));
+            }
+            if let Some(factor) = factor(Subject::Trilinear(weight)) {
+                notes.push(format!("Trilinear: {factor:.2}"));
+            }
+            if let Some(report) = self.find(field, extent, Subject::Report).filter(|_| weight == f32::NAME) {
+                notes.push(format!("MeshReport: {:.2} Mtri/s", report.triangles as f64 / report.seconds / 1e6));
             }
             if let Some(factor) = factor(Subject::NetsI8).filter(|_| weight == i8::NAME) {
                 notes.push(format!("nets on i8: {factor:.1}"));
