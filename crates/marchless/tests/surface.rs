@@ -255,3 +255,46 @@ fn a_reused_buffer_holds_only_what_was_asked_for() {
     assert_eq!(lengths(with_materials, false), [count, 0, count]);
     assert_eq!(lengths(samples, false), [count, 0, 0]);
 }
+
+/// Scaled by a power of two, all weights and the isovalue are as exact as before, and so is everything decided by them:
+/// the triangles of both.
+fn cell_and_scaled(weights: [f32; 8], isovalue: f32) -> [MeshBuffer; 2] {
+    [1.0, 2f32.powi(-60)].map(|scale| {
+        let weights = weights.map(|weight| weight * scale);
+        let samples = Samples::new(Shape::cube(2).expect("small"), &weights).expect("one weight a sample");
+        mesh(samples, &settings(isovalue * scale, Topology::Trilinear))
+    })
+}
+
+proptest! {
+    #[test]
+    fn scale_decides_nothing(
+        weights in proptest::array::uniform8(prop_oneof![-3.4e38f32..3.4e38, -1e37f32..1e37]),
+        isovalue in prop_oneof![Just(0.0), -3e38f32..3e38],
+    ) {
+        let [cell, scaled] = cell_and_scaled(weights, isovalue);
+        prop_assert_eq!(cell.indices, scaled.indices);
+    }
+}
+
+/// Where a weight and the isovalue are at the two ends of `f32`, their difference does not fit it.
+#[test]
+fn tunnels_are_found_at_the_limits_of_f32() {
+    let (max, min) = (f32::MAX, f32::MIN);
+    let wide = [
+        2.435_109_1e38,
+        -1.339_752_2e37,
+        -1.099_354_9e38,
+        2.903_498_7e38,
+        6.965_222_3e37,
+        7.400_441_3e37,
+        -3.039_153_4e38,
+        2.426_889_9e38,
+    ];
+    for (weights, isovalue) in [(wide, 7.251_333_6e37), ([min, min, min, max, max, min, min, min], -1.712_367_4e38)] {
+        let [cell, scaled] = cell_and_scaled(weights, isovalue);
+        assert_eq!(cell.indices, scaled.indices);
+        let report = MeshReport::new(&cell.positions, &cell.indices);
+        assert!(report.is_clean() && (report.components, report.euler) == (1, 0), "{report}");
+    }
+}

@@ -66,8 +66,9 @@ pub(super) enum Change {
     Made {
         /// The cell's first vertex in its interior.
         first_interior: u32,
-        /// From here on, so many of [`Exact::triangles`].
-        triangles: [u32; 2],
+        /// From `start` on, so many of [`Exact::triangles`].
+        start: usize,
+        count: u8,
     },
 }
 
@@ -108,8 +109,8 @@ impl Exact {
 
     /// The triangles of a cell that was made. Corners are named by the edge that they lie on, 0–11, and behind these by
     /// the vertex in the cell's interior.
-    pub(super) fn triangles(&self, [start, count]: [u32; 2]) -> &[[u8; 3]] {
-        &self.triangles[start as usize..][..count as usize]
+    pub(super) fn triangles(&self, start: usize, count: u8) -> &[[u8; 3]] {
+        &self.triangles[start..][..count.into()]
     }
 
     /// Decides all open cells between the slabs `low` and `high`; makes their vertices that are on no edge, which are
@@ -187,9 +188,9 @@ impl Exact {
                 let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
                 if waist.is_some() || outcome.is_made() {
                     let cell = Open { lattice, planes, settings, x, y, case: case_of(&weights), weights };
-                    let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len() as u32);
+                    let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len());
                     made += cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
-                    change = Change::Made { first_interior, triangles: [start, self.triangles.len() as u32 - start] };
+                    change = Change::Made { first_interior, start, count: (self.triangles.len() - start) as u8 };
                 }
             }
             let word = y as usize * lattice.words + x as usize / 64;

@@ -162,9 +162,9 @@ fn splice<S: Simd>(
         let at = of_word.start + cells_before - flushed;
         match cell.change {
             Change::Code(code) => codes[at] = code,
-            Change::Made { first_interior, triangles } => {
+            Change::Made { first_interior, start, count } => {
                 flush::<S>(&codes[..at], counters, indices);
-                add(usize::from(codes[at]), exact.triangles(triangles), first_interior, counters, indices);
+                add(usize::from(codes[at]), exact.triangles(start, count), first_interior, counters, indices);
                 codes.copy_within(at + 1..of_word.end, 0);
                 of_word.end -= at + 1;
                 flushed += at + 1;

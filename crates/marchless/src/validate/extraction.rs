@@ -63,14 +63,14 @@ impl ExtractionReport {
     pub fn new<W: Weight>(samples: Samples<'_, W>, settings: &MeshSettings, mesh: &MeshBuffer) -> Self {
         let lattice = Lattice::of(samples, settings.isovalue);
         let mut report = Self { vertices: mesh.positions.len(), ..Self::default() };
-        // A bit for each edge: those along x, y and z from each meshed sample.
-        let mut seen = vec![0u64; (3 * lattice.len()).div_ceil(64)];
+        // Along each axis, a bit for the edge from each meshed sample.
+        let mut seen = [(); 3].map(|()| vec![0u64; lattice.len().div_ceil(64)]);
         let mut crossings_seen = 0;
         for &position in &mesh.positions {
             match lattice.place_of(position) {
                 Place::Edge { low, axis } if lattice.is_crossing(low, axis) => {
-                    let edge = 3 * lattice.index(low) + axis;
-                    let (word, bit) = (&mut seen[edge / 64], 1 << (edge % 64));
+                    let edge = lattice.index(low);
+                    let (word, bit) = (&mut seen[axis][edge / 64], 1 << (edge % 64));
                     let repeated = *word & bit != 0;
                     *word |= bit;
                     crossings_seen += usize::from(!repeated);

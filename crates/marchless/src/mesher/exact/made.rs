@@ -34,30 +34,17 @@ impl<W: Weight> Open<'_, W> {
         out: &mut MeshBuffer,
     ) -> u64 {
         let field = Trilinear::new(&self.weights);
-        let Some(tunnel) = waist.and_then(|waist| Tunnel::new(self.case, joined, &field, waist)) else {
-            let sheets =
-                if outcome.is_made() { *outcome.sheets() } else { Sheets::new(&Loops::new(self.case, joined), 0) };
-            return self.add_sheets(&sheets, 0, &field, triangles, bounds, out);
-        };
-        for corner in tunnel.ring {
-            self.vertex(&field, corner, bounds, out);
+        if let Some(tunnel) = waist.and_then(|waist| Tunnel::new(self.case, joined, &field, waist)) {
+            for corner in tunnel.ring {
+                self.vertex(&field, corner, bounds, out);
+            }
+            triangles.extend(tunnel.strips.iter().flat_map(Strip::triangles));
+            triangles.extend_from_slice(tunnel.others.triangles());
+            debug_assert!(tunnel.others.rim().is_empty(), "beside a tunnel there is at most one small sheet");
+            return RING as u64;
         }
-        triangles.extend(tunnel.strips.iter().flat_map(Strip::triangles));
-        RING as u64 + self.add_sheets(&tunnel.others, RING as u8, &field, triangles, bounds, out)
-    }
-
-    /// Appends triangles; returns how many vertices there are in the interior, behind `before` others.
-    fn add_sheets(
-        &self,
-        sheets: &Sheets,
-        before: u8,
-        field: &Trilinear,
-        triangles: &mut Vec<[u8; 3]>,
-        bounds: &mut Bounds,
-        out: &mut MeshBuffer,
-    ) -> u64 {
-        let name = |corner: u8| if corner < FIRST_INTERIOR { corner } else { corner + before };
-        triangles.extend(sheets.triangles().iter().map(|triangle| triangle.map(name)));
+        let sheets = if outcome.is_made() { *outcome.sheets() } else { Sheets::new(&Loops::new(self.case, joined), 0) };
+        triangles.extend_from_slice(sheets.triangles());
         if sheets.rim().is_empty() {
             return 0;
         }
@@ -66,7 +53,7 @@ impl<W: Weight> Open<'_, W> {
             let crossing = self.crossing(edge);
             mean = [0, 1, 2].map(|axis| mean[axis] + crossing[axis] / sheets.rim().len() as f64);
         }
-        self.vertex(field, field.nearest_to(mean), bounds, out);
+        self.vertex(&field, field.nearest_to(mean), bounds, out);
         1
     }
 
@@ -109,7 +96,8 @@ struct Trilinear([f64; 8]);
 
 impl Trilinear {
     fn new(weights: &[f64; 8]) -> Self {
-        let [least, most] = [f32::MIN, f32::MAX].map(f64::from);
+        // Twice what `f32` holds: the isovalue has been taken off.
+        let [least, most] = [f32::MIN, f32::MAX].map(|limit| 2.0 * f64::from(limit));
         Self(weights.map(|weight| if weight.is_nan() { most } else { weight.clamp(least, most) }))
     }
 

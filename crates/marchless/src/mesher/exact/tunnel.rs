@@ -29,7 +29,8 @@ pub(super) const RING: usize = 6;
 /// Crossings of a cell, and so of a loop, at most.
 const MOST: usize = 12;
 
-/// Waists closer to a face of the cell are left out: floating point does not tell on which side of the crossings they are.
+/// Tunnels whose waist is closer to a face of the cell are left out: floating point does not tell well enough on which
+/// side of the crossings it is.
 const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The waist of the tunnel between the sheets of a cell with these weights at its corners, where there are several
