@@ -6,7 +6,7 @@ use core::{
 };
 use std::alloc::System;
 
-use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 
 thread_local! {
     /// How often this thread has allocated, and how many bytes; the test harness has threads of its own.
@@ -58,10 +58,11 @@ fn mesh_all<W: Weight>(fields: &[(Shape, Vec<W>, Vec<u8>)], mesher: &mut Mesher,
         let plain = Samples::new(*shape, weights).expect("one weight a sample");
         let with_materials = plain.with_materials(materials).expect("one material a sample");
         for samples in [plain, plain.padded(), with_materials, with_materials.padded()] {
-            for normals in [true, false] {
-                mesher
-                    .mesh(samples, &MeshSettings { isovalue: 0.25, normals, ..MeshSettings::default() }, out)
-                    .expect("the shapes are large enough");
+            for (normals, topology) in
+                [(true, Topology::Separated), (false, Topology::Separated), (true, Topology::Trilinear)]
+            {
+                let settings = MeshSettings { isovalue: 0.25, normals, topology };
+                mesher.mesh(samples, &settings, out).expect("the shapes are large enough");
                 assert!(!out.is_empty());
             }
         }

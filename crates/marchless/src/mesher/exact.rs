@@ -5,9 +5,9 @@
 //! of the cell may be joined through its middle. Word operations find them among all cells. Most are settled by the
 //! faces: the weights of an ambiguous face's corners, multiplied diagonal by diagonal, tell which two are joined (the
 //! asymptotic decider), and the same products come out of both cells at the face. A table then has the code of the
-//! triangles, as for any other case. Left over are cells of which some loop has no fan, those of
-//! more than five triangles, and those whose sheets are joined by a tunnel. These few are made one by one, most of them
-//! with vertices in their interior.
+//! triangles, as for any other case. Left over are cells of which some loop has no fan, those of more than five
+//! triangles, and those whose sheets are joined by a tunnel. These few are made one by one, most of them with vertices in
+//! their interior.
 //!
 //! In a face's products, ties and weights that are not finite leave the inside separated, as in all other meshes.
 //!
@@ -21,8 +21,8 @@ mod tunnel;
 
 use alloc::vec::Vec;
 
+use table::FACE_CORNERS;
 pub(super) use table::{EXTRA_CODES, extra_case, extra_triangles};
-use table::{FACE_CORNERS, Outcome};
 
 use super::{
     MeshSettings,
@@ -37,13 +37,8 @@ use crate::{buffer::MeshBuffer, cell::CaseIndex, sample::Weight, simd::Simd};
 /// The decided cells between two slabs, in the order of all cells.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
-    /// The lattice positions of open cells that are not decided yet.
-    x: [u32; ROOM],
-    y: [u32; ROOM],
-    /// Those of them that the faces may have made differ from their case.
-    decided: [Decided; ROOM],
     cells: Vec<ExactCell>,
-    /// Of the cells that are made one by one, corners named as in [`ExactCell::triangles`].
+    /// Of the cells that are made one by one, corners named as in [`Exact::triangles`].
     triangles: Vec<[u8; 3]>,
 }
 
@@ -72,25 +67,9 @@ pub(super) enum Change {
     },
 }
 
-/// An open cell whose faces are decided, and which may differ from its case.
-#[derive(Clone, Copy, Debug)]
-struct Decided {
-    /// Its place in the lists of open cells.
-    place: u8,
-    /// A bit for each face whose inside corners are joined.
-    joined: u8,
-    outcome: Outcome,
-}
-
-/// Open cells that are listed before they are decided, so that deciding is a loop without branches.
-const GATHERED: usize = 128;
-/// Room for them, and for the rest of the word that makes them enough.
-const ROOM: usize = GATHERED + 64;
-
 impl Exact {
     pub(super) const fn new() -> Self {
-        let decided = [Decided { place: 0, joined: 0, outcome: Outcome::NONE }; ROOM];
-        Self { x: [0; ROOM], y: [0; ROOM], decided, cells: Vec::new(), triangles: Vec::new() }
+        Self { cells: Vec::new(), triangles: Vec::new() }
     }
 
     pub(super) fn clear(&mut self) {
@@ -127,7 +106,7 @@ impl Exact {
         out: &mut MeshBuffer,
     ) -> u64 {
         self.clear();
-        let (mut made, mut gathered) = (0, 0);
+        let mut made = 0;
         let (words, last_bit) = (lattice.words, lattice.last_word ^ lattice.last_word >> 1);
         let mut open = [0; WORDS];
         let cells = words * (lattice.size[1] - 1);
@@ -143,59 +122,47 @@ impl Exact {
                 nonzero &= nonzero - 1;
                 let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
                 // Behind a row's last cell, its last samples stand for those that are missing.
-                let bits = open[i % WORDS] & if ends_row { !last_bit } else { u64::MAX };
-                let (y, x) = lattice.place_of(start + i);
-                let (xs, ys) = (self.x[gathered..].first_chunk_mut(), self.y[gathered..].first_chunk_mut());
-                let (xs, ys) = xs.zip(ys).expect("there is room for another word's");
-                gathered += S::positions(bits, x, y, xs, ys);
-                if gathered >= GATHERED {
-                    made += self.flush(gathered, lattice, planes, settings, first_vertex + made, bounds, out);
-                    gathered = 0;
+                let mut bits = open[i % WORDS] & if ends_row { !last_bit } else { u64::MAX };
+                while bits != 0 {
+                    let (word, bit) = (start + i, bits.trailing_zeros());
+                    bits &= bits - 1;
+                    made += self.cell(lattice, planes, settings, word, bit, first_vertex + made, bounds, out);
                 }
             }
         }
-        made + self.flush(gathered, lattice, planes, settings, first_vertex + made, bounds, out)
+        made
     }
 
-    /// Decides the first `count` cells that were gathered; returns how many vertices they got in their interior.
+    /// Decides one cell; returns how many vertices it got in its interior.
     #[inline(never)]
-    fn flush<W: Weight>(
+    fn cell<W: Weight>(
         &mut self,
-        count: usize,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
         settings: &MeshSettings,
+        word: usize,
+        bit: u32,
         first_vertex: u64,
         bounds: &mut Bounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        let mut changed = 0;
-        for place in 0..count {
-            let weights = weights(lattice, planes, settings, self.x[place], self.y[place]);
-            let case = case_of(&weights);
-            let joined = joined_faces(&weights, case);
-            let outcome = table::outcome(case, joined);
-            self.decided[changed] = Decided { place: place as u8, joined, outcome };
-            changed += usize::from(outcome.differs_from(case));
+        let (y, x) = lattice.place_of(word);
+        let weights = weights(lattice, planes, settings, x + bit, y);
+        let case = case_of(&weights);
+        let joined = joined_faces(&weights, case);
+        let outcome = table::outcome(case, joined);
+        if !outcome.differs_from(case) {
+            return 0;
         }
-        let mut made = 0;
-        for index in 0..changed {
-            let Decided { place, joined, outcome } = self.decided[index];
-            let [x, y] = [self.x[usize::from(place)], self.y[usize::from(place)]];
-            let mut change = Change::Code(outcome.code());
-            if outcome.is_made() || outcome.may_have_tunnel() {
-                let weights = weights(lattice, planes, settings, x, y);
-                let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
-                if waist.is_some() || outcome.is_made() {
-                    let cell = Open { lattice, planes, settings, x, y, case: case_of(&weights), weights };
-                    let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len());
-                    made += cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
-                    change = Change::Made { first_interior, start, count: (self.triangles.len() - start) as u8 };
-                }
-            }
-            let word = y as usize * lattice.words + x as usize / 64;
-            self.cells.push(ExactCell { word, bit: x % 64, change });
+        let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
+        let (mut change, mut made) = (Change::Code(outcome.code()), 0);
+        if waist.is_some() || outcome.is_made() {
+            let (first_interior, start) = (first_vertex as u32, self.triangles.len());
+            let cell = Open { lattice, planes, settings, x: x + bit, y, case, weights };
+            made = cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
+            change = Change::Made { first_interior, start, count: (self.triangles.len() - start) as u8 };
         }
+        self.cells.push(ExactCell { word, bit, change });
         made
     }
 }

@@ -101,14 +101,6 @@ impl Trilinear {
         Self(weights.map(|weight| if weight.is_nan() { most } else { weight.clamp(least, most) }))
     }
 
-    fn at(&self, [x, y, z]: [f64; 3]) -> f64 {
-        let between = |from: f64, to: f64, t: f64| from + (to - from) * t;
-        let [a, b, c, d, e, f, g, h] = self.0;
-        let low = between(between(a, b, x), between(c, d, x), y);
-        let high = between(between(e, f, x), between(g, h, x), y);
-        between(low, high, z)
-    }
-
     /// Where the interpolant is 0 on an edge, whose ends differ in sign.
     fn crossing(&self, edge: Edge) -> [f64; 3] {
         let [low, high] = edge.corners();
@@ -171,7 +163,8 @@ impl Tunnel {
         let loops = &Loops::new(case, joined);
         let corner = |corner: usize, waist: &Waist| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
         // On the ring the interpolant is about 0. What the tunnel goes around is farthest from that.
-        let through = |end: usize| field.at(corner(end, &waist)) + field.at(corner(end ^ 7, &waist));
+        let value = |end: usize| field.at_with_gradient(corner(end, &waist)).0;
+        let through = |end: usize| value(end) + value(end ^ 7);
         let end = (0..4).max_by(|&a, &b| through(a).abs().total_cmp(&through(b).abs()))?;
         let joined = joined_loops(case, loops, through(end) < 0.0)?;
 

@@ -16,7 +16,7 @@ impl Outcome {
     /// Sheets of it may be joined by a tunnel.
     const TUNNEL: u16 = 1 << 15;
     /// That of the case without inside corners.
-    pub(super) const NONE: Self = Self(0);
+    const NONE: Self = Self(0);
 
     /// Whether it is anything else than the triangles of this case.
     pub(super) const fn differs_from(self, case: CaseIndex) -> bool {
