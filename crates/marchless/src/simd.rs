@@ -15,6 +15,8 @@
 
 use core::mem::MaybeUninit;
 
+use crate::cell::Face;
+
 mod portable;
 
 #[cfg(target_arch = "x86_64")]
@@ -138,6 +140,23 @@ pub trait Simd {
     /// What is written behind them means nothing. Bit `x` of `corners[k]` is corner `k` of cell `x`.
     fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize;
 
+    /// The products of the weights at opposite corners of a cell's faces: a bit for each face of which the product of the
+    /// first and third corner is the larger one, and of which that of the second and fourth is. Neither where the larger
+    /// one is infinite or one of them is NaN.
+    #[inline(always)]
+    fn larger_products(weights: &[f64; 8]) -> [u8; 2] {
+        let (mut first_larger, mut second_larger, mut face) = (0, 0, 0);
+        // Written so that the compiler unrolls it.
+        while face < 6 {
+            let [a, b, c, d] = FACE_CORNERS.map(|corners| corners[face] as usize);
+            let (first, second) = (weights[a] * weights[c], weights[b] * weights[d]);
+            first_larger |= u8::from((first > second) & (first < f64::INFINITY)) << face;
+            second_larger |= u8::from((second > first) & (second < f64::INFINITY)) << face;
+            face += 1;
+        }
+        [first_larger, second_larger]
+    }
+
     /// Writes the triangles of cells, one after the other: for each of `codes`, 16 indices made from the running
     /// `counters` by the entry of `recipes`, of which the next cell overwrites those that are too many. Returns how
     /// many indices count: that many have been written.
@@ -150,6 +169,21 @@ pub trait Simd {
         indices: &mut [MaybeUninit<u32>],
     ) -> usize;
 }
+
+/// The first, second, third and fourth corner of each face, around it. In the places of a seventh and eighth face, the
+/// products are equal.
+const FACE_CORNERS: [[u64; 8]; 4] = {
+    let (mut corners, mut face) = ([[0; 8]; 4], 0);
+    while face < 6 {
+        let mut corner = 0;
+        while corner < 4 {
+            corners[corner][face] = Face::ALL[face].corners()[corner].index() as u64;
+            corner += 1;
+        }
+        face += 1;
+    }
+    corners
+};
 
 /// Codes of cells; a power of two, so that a masked code needs no check.
 pub(crate) const CODES: usize = 1024;

@@ -21,148 +21,139 @@ mod tunnel;
 
 use alloc::vec::Vec;
 
-use table::FACE_CORNERS;
 pub(super) use table::{EXTRA_CODES, extra_case, extra_triangles};
 
-use super::{
-    MeshSettings,
-    classify::Signs,
-    output::Bounds,
-    slabs::Lattice,
-    triangles::{WORDS, corner_words},
-    vertices::{Planes, filled},
-};
+use super::{MeshSettings, output::Bounds, slabs::Lattice, vertices::Planes};
 use crate::{buffer::MeshBuffer, cell::CaseIndex, sample::Weight, simd::Simd};
 
-/// The decided cells between two slabs, in the order of all cells.
+/// The open cells between two slabs.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
-    cells: Vec<ExactCell>,
+    /// In the order of all cells.
+    open: Vec<OpenCell>,
+    made: Vec<MadeCell>,
     /// Of the cells that are made one by one, corners named as in [`Exact::triangles`].
     triangles: Vec<[u8; 3]>,
 }
 
-/// A cell whose triangles are not those of its case.
+/// A cell that its signs leave open.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ExactCell {
-    /// The number of the word of signs that it is in, and of its bit there.
-    pub(super) word: usize,
-    pub(super) bit: u32,
-    /// What to do with it.
-    pub(super) change: Change,
+pub(super) struct OpenCell {
+    /// The place of its code among all codes.
+    pub(super) place: u32,
+    /// The lattice position of its lowest corner.
+    pub(super) x: u32,
+    pub(super) y: u32,
+    /// Its case and its [`joined_faces`], once decided.
+    case: CaseIndex,
+    joined: u8,
 }
 
-/// What takes the place of a case.
+impl OpenCell {
+    pub(super) const fn new(place: u32, x: u32, y: u32) -> Self {
+        Self { place, x, y, case: CaseIndex(0), joined: 0 }
+    }
+}
+
+/// A cell whose triangles are those of no code.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Change {
-    /// Another code.
-    Code(u16),
-    /// Triangles made for this cell.
-    Made {
-        /// The cell's first vertex in its interior.
-        first_interior: u32,
-        /// From `start` on, so many of [`Exact::triangles`].
-        start: usize,
-        count: u8,
-    },
+pub(super) struct MadeCell {
+    /// The place of its code among all codes. That is its case.
+    pub(super) place: usize,
+    /// The first vertex in its interior.
+    pub(super) first_interior: u32,
+    /// From `start` on, so many of [`Exact::triangles`].
+    start: usize,
+    count: u8,
 }
 
 impl Exact {
     pub(super) const fn new() -> Self {
-        Self { cells: Vec::new(), triangles: Vec::new() }
+        Self { open: Vec::new(), made: Vec::new(), triangles: Vec::new() }
     }
 
     pub(super) fn clear(&mut self) {
-        self.cells.clear();
+        self.open.clear();
+        self.made.clear();
         self.triangles.clear();
     }
 
-    pub(super) fn cells(&self) -> &[ExactCell] {
-        &self.cells
+    /// Where open cells are to be listed, in order.
+    pub(super) fn open_cells(&mut self) -> &mut Vec<OpenCell> {
+        &mut self.open
     }
 
-    /// The word of the cell with this number, or a number that no word has.
-    pub(super) fn word_of(&self, number: usize) -> usize {
-        self.cells.get(number).map_or(usize::MAX, |cell| cell.word)
+    /// The cells that were made, in order.
+    pub(super) fn made_cells(&self) -> &[MadeCell] {
+        &self.made
     }
 
     /// The triangles of a cell that was made. Corners are named by the edge that they lie on, 0–11, and behind these by
     /// the vertex in the cell's interior.
-    pub(super) fn triangles(&self, start: usize, count: u8) -> &[[u8; 3]] {
-        &self.triangles[start..][..count.into()]
+    pub(super) fn triangles(&self, cell: &MadeCell) -> &[[u8; 3]] {
+        &self.triangles[cell.start..][..cell.count.into()]
     }
 
-    /// Decides all open cells between the slabs `low` and `high`; makes their vertices that are on no edge, which are
-    /// numbered from `first_vertex` on, and returns how many there are.
+    /// Decides all open cells between two slabs and changes their `codes`; makes their vertices that are on no edge,
+    /// which are numbered from `first_vertex` on, and returns how many there are.
     #[inline(always)]
     pub(super) fn decide<S: Simd, W: Weight>(
         &mut self,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
         settings: &MeshSettings,
-        [low, high]: [&Signs; 2],
+        codes: &mut [u16],
         first_vertex: u64,
         bounds: &mut Bounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        self.clear();
-        let mut made = 0;
-        let (words, last_bit) = (lattice.words, lattice.last_word ^ lattice.last_word >> 1);
-        let mut open = [0; WORDS];
-        let cells = words * (lattice.size[1] - 1);
-        for start in (0..cells).step_by(WORDS) {
-            let count = (cells - start).min(WORDS);
-            let [a, b, c, d, e, f, g, h] = corner_words(low, high, start, count, words);
-            for i in 0..count {
-                open[i] = open_cells([a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]]);
-            }
-            let mut nonzero = S::nonzero(filled(&mut open, count));
-            while nonzero != 0 {
-                let i = nonzero.trailing_zeros() as usize;
-                nonzero &= nonzero - 1;
-                let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
-                // Behind a row's last cell, its last samples stand for those that are missing.
-                let mut bits = open[i % WORDS] & if ends_row { !last_bit } else { u64::MAX };
-                while bits != 0 {
-                    let (word, bit) = (start + i, bits.trailing_zeros());
-                    bits &= bits - 1;
-                    made += self.cell(lattice, planes, settings, word, bit, first_vertex + made, bounds, out);
-                }
-            }
+        // Without a branch, for which way a cell goes is anyone's guess. Those with more to do move to the front.
+        let mut left = 0;
+        for index in 0..self.open.len() {
+            let cell = self.open[index];
+            let weights = weights_of(lattice, planes, settings, cell.x, cell.y);
+            let code = &mut codes[cell.place as usize];
+            let case = CaseIndex(*code as u8);
+            let larger = S::larger_products(&weights);
+            let joined = table::joined_faces(case, larger);
+            let outcome = table::outcome(case, joined);
+            *code = outcome.code_or(case);
+            self.open[left] = OpenCell { case, joined, ..cell };
+            left += usize::from(outcome.is_made() | outcome.may_have_tunnel() & tunnel::is_possible(larger));
         }
-        made
+        if left == 0 {
+            return 0;
+        }
+        self.open.truncate(left);
+        self.make(lattice, planes, settings, codes, first_vertex, bounds, out)
     }
 
-    /// Decides one cell; returns how many vertices it got in its interior.
+    /// Makes those cells that have to be.
     #[inline(never)]
-    fn cell<W: Weight>(
+    fn make<W: Weight>(
         &mut self,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
         settings: &MeshSettings,
-        word: usize,
-        bit: u32,
+        codes: &mut [u16],
         first_vertex: u64,
         bounds: &mut Bounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        let (y, x) = lattice.place_of(word);
-        let weights = weights(lattice, planes, settings, x + bit, y);
-        let case = case_of(&weights);
-        let joined = joined_faces(&weights, case);
-        let outcome = table::outcome(case, joined);
-        if !outcome.differs_from(case) {
-            return 0;
+        let mut made = 0;
+        for &OpenCell { place, x, y, case, joined } in &self.open {
+            let weights = weights_of(lattice, planes, settings, x, y);
+            let outcome = table::outcome(case, joined);
+            let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
+            if waist.is_some() || outcome.is_made() {
+                let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len());
+                let cell = Open { lattice, planes, settings, x, y, case, weights };
+                made += cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
+                let (place, count) = (place as usize, (self.triangles.len() - start) as u8);
+                codes[place] = case.0.into();
+                self.made.push(MadeCell { place, first_interior, start, count });
+            }
         }
-        let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
-        let (mut change, mut made) = (Change::Code(outcome.code()), 0);
-        if waist.is_some() || outcome.is_made() {
-            let (first_interior, start) = (first_vertex as u32, self.triangles.len());
-            let cell = Open { lattice, planes, settings, x: x + bit, y, case, weights };
-            made = cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
-            change = Change::Made { first_interior, start, count: (self.triangles.len() - start) as u8 };
-        }
-        self.cells.push(ExactCell { word, bit, change });
         made
     }
 }
@@ -181,7 +172,7 @@ struct Open<'a, W> {
 
 /// The bits of the cells whose case leaves something open. Bit `x` of `corners[k]` is corner `k` of cell `x`.
 #[inline(always)]
-const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
+pub(super) const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
     // Alternating around a face: alike along both diagonals, and not all alike.
     let across_x = !(a ^ g | c ^ e) & (a ^ c) | !(b ^ h | d ^ f) & (b ^ d);
     let across_y = !(a ^ f | b ^ e) & (a ^ b) | !(c ^ h | d ^ g) & (c ^ d);
@@ -193,7 +184,13 @@ const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
 
 /// The weights at a cell's corners, less the isovalue, in voxels.
 #[inline(always)]
-fn weights<W: Weight>(lattice: &Lattice, planes: &Planes<'_, W>, settings: &MeshSettings, x: u32, y: u32) -> [f64; 8] {
+fn weights_of<W: Weight>(
+    lattice: &Lattice,
+    planes: &Planes<'_, W>,
+    settings: &MeshSettings,
+    x: u32,
+    y: u32,
+) -> [f64; 8] {
     let (at, isovalue) = (lattice.index(x, y), f64::from(settings.isovalue));
     let [_, low, high, _] = planes.slabs;
     let (a, c) = (&low[at..][..2], &low[at + lattice.stride..][..2]);
@@ -205,29 +202,4 @@ fn weights<W: Weight>(lattice: &Lattice, planes: &Planes<'_, W>, settings: &Mesh
         corner += 1;
     }
     weights
-}
-
-#[inline(always)]
-fn case_of(weights: &[f64; 8]) -> CaseIndex {
-    let mut case = 0;
-    for (corner, &weight) in weights.iter().enumerate() {
-        case |= u8::from(weight < 0.0) << corner;
-    }
-    CaseIndex(case)
-}
-
-/// A bit for each ambiguous face whose inside corners are joined.
-#[inline(always)]
-fn joined_faces(weights: &[f64; 8], case: CaseIndex) -> u8 {
-    let (mut joined, mut face) = (0, 0);
-    // Written so that the compiler unrolls it.
-    while face < 6 {
-        let [a, b, c, d] = FACE_CORNERS[face];
-        let (along, across) = (weights[a] * weights[c], weights[b] * weights[d]);
-        let (inside, outside) = if case.0 >> a & 1 == 1 { (along, across) } else { (across, along) };
-        // Comparisons with NaN are false.
-        joined |= u8::from((inside > outside) & (inside < f64::INFINITY)) << face;
-        face += 1;
-    }
-    joined & table::ambiguous_faces(case)
 }

@@ -6,7 +6,7 @@ use super::{
     MeshError, MeshSettings, Topology,
     classify::{self, Signs},
     exact::Exact,
-    triangles::{self, FirstVertices},
+    triangles::{self, Codes, FirstVertices},
     vertices::{Planes, Vertices},
 };
 use crate::{
@@ -115,7 +115,9 @@ pub(super) struct Slabs {
     /// The signs of the slab before, of the slab itself, and of the next one: that is read early, in one go, so that
     /// the gradients, which need a sample of it here and there, find it in the cache.
     signs: [Signs; 3],
-    /// The cells between the two that their signs leave open.
+    /// The cells between the slab before and the slab itself.
+    codes: Codes,
+    /// Those of them that their signs leave open.
     exact: Exact,
     /// The first vertices of the slab before on edges along x and y.
     first: [u64; 2],
@@ -125,7 +127,13 @@ pub(super) struct Slabs {
 
 impl Slabs {
     pub(super) const fn new() -> Self {
-        Self { signs: [Signs::new(), Signs::new(), Signs::new()], exact: Exact::new(), first: [0; 2], vertices: 0 }
+        Self {
+            signs: [Signs::new(), Signs::new(), Signs::new()],
+            codes: Codes::new(),
+            exact: Exact::new(),
+            first: [0; 2],
+            vertices: 0,
+        }
     }
 
     /// Takes in the next slab: makes the vertices on edges from the slab before and on those within the slab, and the
@@ -169,12 +177,13 @@ impl Slabs {
                 z: window.z.wrapping_sub(1),
             };
             self.vertices += pass.place::<S, 2>(lattice, &planes, settings, before.signs(), newest.signs(), out);
-            if settings.topology == Topology::Trilinear {
-                let (signs, bounds) = ([&*before, &*newest], &mut pass.bounds);
+            self.exact.clear();
+            let is_exact = settings.topology == Topology::Trilinear;
+            self.codes.fill::<S>(lattice, before, newest, is_exact.then(|| self.exact.open_cells()));
+            if is_exact {
+                let (codes, bounds) = (self.codes.get_mut(), &mut pass.bounds);
                 self.vertices +=
-                    self.exact.decide::<S, W>(lattice, &planes, settings, signs, self.vertices, bounds, out);
-            } else {
-                self.exact.clear();
+                    self.exact.decide::<S, W>(lattice, &planes, settings, codes, self.vertices, bounds, out);
             }
         }
         self.first = [self.vertices; 2];
@@ -201,7 +210,7 @@ impl Slabs {
         }
         if joined {
             (first.x[1], first.y[1]) = (self.first[0] as u32, self.first[1] as u32);
-            triangles::join::<S>(lattice, before, newest, &first, &self.exact, &mut out.indices);
+            triangles::join::<S>(lattice, before, newest, &first, &mut self.codes, &self.exact, &mut out.indices);
         }
         Ok(())
     }

@@ -8,11 +8,10 @@
 //! no cell's low side. It is the case of a cell whose high side repeats these samples, moved up.
 
 use alloc::vec::Vec;
-use core::ops::Range;
 
 use super::{
     classify::Signs,
-    exact::{Change, EXTRA_CODES, Exact, extra_case, extra_triangles},
+    exact::{self, EXTRA_CODES, Exact, OpenCell, extra_case, extra_triangles},
     output::{keep, room},
     slabs::Lattice,
     vertices::filled,
@@ -28,12 +27,12 @@ const CLOSING: u16 = 256;
 /// Behind these come those of cases whose faces were decided otherwise.
 pub(super) const FIRST_EXTRA: u16 = 512;
 
-/// Codes that are gathered before they become triangles: enough to make the loop over them long, few enough to stay in
-/// the first cache.
-const GATHERED: usize = 256;
+/// Codes that become triangles at once: enough to make the loop over them long, few enough not to ask for much more
+/// room than they need.
+const AT_ONCE: usize = 256;
 
 /// Words that are looked at together.
-pub(super) const WORDS: usize = 64;
+const WORDS: usize = 64;
 
 /// The first vertices of two neighbouring slabs on their edges along x and y, and on those along z between them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,13 +42,94 @@ pub(super) struct FirstVertices {
     pub(super) z: u32,
 }
 
-/// Writes the triangles of all cells between the slabs `low` and `high`, row by row.
+/// The codes of the cells that the surface crosses, in order.
+#[derive(Clone, Debug)]
+pub(super) struct Codes {
+    /// The first `count` count.
+    codes: Vec<u16>,
+    count: usize,
+    /// Of some words of cells: which the surface crosses, which are open, and where each word's first code is. Kept, since
+    /// filling them with zeros first would take its time.
+    active: [u64; WORDS],
+    open: [u64; WORDS],
+    firsts: [usize; WORDS],
+}
+
+impl Codes {
+    pub(super) const fn new() -> Self {
+        Self { codes: Vec::new(), count: 0, active: [0; WORDS], open: [0; WORDS], firsts: [0; WORDS] }
+    }
+
+    pub(super) fn get_mut(&mut self) -> &mut [u16] {
+        &mut self.codes[..self.count]
+    }
+
+    /// Takes in all cells between the slabs `low` and `high`, row by row, and lists those that are open if asked to.
+    #[inline(always)]
+    pub(super) fn fill<S: Simd>(
+        &mut self,
+        lattice: &Lattice,
+        low: &Signs,
+        high: &Signs,
+        mut open_cells: Option<&mut Vec<OpenCell>>,
+    ) {
+        let words = lattice.words;
+        let last_bit = lattice.last_word ^ lattice.last_word >> 1;
+        let Self { codes, count: gathered, active, open, firsts } = self;
+        let cells = words * (lattice.size[1] - 1);
+        *gathered = 0;
+        for start in (0..cells).step_by(WORDS) {
+            let count = (cells - start).min(WORDS);
+            let [a, b, c, d, e, f, g, h] = corner_words(low, high, start, count, words);
+            for i in 0..count {
+                let any = a[i] | b[i] | c[i] | d[i] | e[i] | f[i] | g[i] | h[i];
+                let all = a[i] & b[i] & c[i] & d[i] & e[i] & f[i] & g[i] & h[i];
+                active[i] = any & !all;
+            }
+            let ends_row = |i: usize| words == 1 || (start + i + 1).is_multiple_of(words);
+            if codes.len() < *gathered + 64 * count {
+                codes.resize(*gathered + 64 * count, 0);
+            }
+            let mut nonzero = S::nonzero(filled(active, count));
+            while nonzero != 0 {
+                let i = nonzero.trailing_zeros() as usize;
+                nonzero &= nonzero - 1;
+                firsts[i % WORDS] = *gathered;
+                let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
+                let room = codes[*gathered..].first_chunk_mut().expect("there is room for another word's codes");
+                *gathered += S::cases(corners, active[i % WORDS], room);
+                codes[*gathered - 1] += if ends_row(i) && active[i % WORDS] & last_bit != 0 { CLOSING } else { 0 };
+            }
+            let Some(open_cells) = &mut open_cells else { continue };
+            for i in 0..count {
+                open[i] = exact::open_cells([a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]]);
+            }
+            let mut nonzero = S::nonzero(filled(open, count));
+            while nonzero != 0 {
+                let i = nonzero.trailing_zeros() as usize;
+                nonzero &= nonzero - 1;
+                // Behind a row's last cell, its last samples stand for those that are missing.
+                let mut bits = open[i % WORDS] & if ends_row(i) { !last_bit } else { u64::MAX };
+                let (y, x) = lattice.place_of(start + i);
+                while bits != 0 {
+                    let below = bits ^ (bits - 1);
+                    let place = firsts[i % WORDS] + (active[i % WORDS] & below >> 1).count_ones() as usize;
+                    open_cells.push(OpenCell::new(place as u32, x + bits.trailing_zeros(), y));
+                    bits &= bits - 1;
+                }
+            }
+        }
+    }
+}
+
+/// Writes the triangles of all cells between the slabs `low` and `high`.
 #[inline(always)]
 pub(super) fn join<S: Simd>(
     lattice: &Lattice,
     low: &Signs,
     high: &Signs,
     first_vertices: &FirstVertices,
+    codes: &mut Codes,
     exact: &Exact,
     indices: &mut Vec<u32>,
 ) {
@@ -65,53 +145,18 @@ pub(super) fn join<S: Simd>(
         first_vertices.z,
         first_vertices.z.wrapping_add(row(low.signs(), high.signs())),
     ];
-    let last_bit = lattice.last_word ^ lattice.last_word >> 1;
-    let (mut codes, mut gathered) = ([0u16; GATHERED + 64], 0);
-    let mut active = [0; WORDS];
-    // The first cell that was decided and not reached, and its word.
-    let (mut decided, mut next_decided) = (0, exact.word_of(0));
-    let cells = words * (lattice.size[1] - 1);
-    for start in (0..cells).step_by(WORDS) {
-        let count = (cells - start).min(WORDS);
-        let [a, b, c, d, e, f, g, h] = corner_words(low, high, start, count, words);
-        for i in 0..count {
-            let any = a[i] | b[i] | c[i] | d[i] | e[i] | f[i] | g[i] | h[i];
-            let all = a[i] & b[i] & c[i] & d[i] & e[i] & f[i] & g[i] & h[i];
-            active[i] = any & !all;
-        }
-        let mut nonzero = S::nonzero(filled(&mut active, count));
-        while nonzero != 0 {
-            let i = nonzero.trailing_zeros() as usize;
-            nonzero &= nonzero - 1;
-            let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
-            let room = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
-            let first = gathered;
-            gathered += S::cases(corners, active[i % WORDS], room);
-            let ends_row = words == 1 || (start + i + 1).is_multiple_of(words);
-            codes[gathered - 1] += if ends_row && active[i % WORDS] & last_bit != 0 { CLOSING } else { 0 };
-            if start + i == next_decided {
-                (gathered, decided) =
-                    splice::<S>(exact, decided, active[i % WORDS], &mut codes, first..gathered, &mut counters, indices);
-                next_decided = exact.word_of(decided);
-            }
-            if gathered >= GATHERED {
-                flush::<S>(&codes[..gathered], &mut counters, indices);
-                gathered = 0;
-            }
-        }
+    let (codes, mut done) = (codes.get_mut(), 0);
+    for cell in exact.made_cells() {
+        write::<S>(&codes[done..cell.place], &mut counters, indices);
+        add(codes[cell.place].into(), exact.triangles(cell), cell.first_interior, &mut counters, indices);
+        done = cell.place + 1;
     }
-    flush::<S>(&codes[..gathered], &mut counters, indices);
+    write::<S>(&codes[done..], &mut counters, indices);
 }
 
 /// The signs of the eight corners of cells, a word each for `count` words of cells from `start` on.
 #[inline(always)]
-pub(super) fn corner_words<'a>(
-    low: &'a Signs,
-    high: &'a Signs,
-    start: usize,
-    count: usize,
-    words: usize,
-) -> [&'a [u64]; 8] {
+fn corner_words<'a>(low: &'a Signs, high: &'a Signs, start: usize, count: usize, words: usize) -> [&'a [u64]; 8] {
     let [a, c] = of_rows(low.signs(), start, count, words);
     let [b, d] = of_rows(low.next(), start, count, words);
     let [e, g] = of_rows(high.signs(), start, count, words);
@@ -132,47 +177,15 @@ pub(super) fn crossings(low: &[u64], high: &[u64]) -> u64 {
 }
 
 #[inline(always)]
-fn flush<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>) {
-    let kept = S::triangles(&RECIPES, codes, counters, room(indices, 16 * codes.len()));
-    // SAFETY: the backend has written them.
-    #[expect(unsafe_code, reason = "spares filling the vector with zeros first")]
-    unsafe {
-        keep(indices, kept);
-    }
-}
-
-/// Puts in what was decided for cells of one word, from the one with number `decided` on. `of_word`: where the codes of
-/// the word's cells, those in `active`, are. Returns how many codes are
-/// left, and the first cell that is none of the word's.
-#[cold]
-#[inline(never)]
-fn splice<S: Simd>(
-    exact: &Exact,
-    mut decided: usize,
-    active: u64,
-    codes: &mut [u16],
-    mut of_word: Range<usize>,
-    counters: &mut [u32; 8],
-    indices: &mut Vec<u32>,
-) -> (usize, usize) {
-    let (word, mut flushed) = (exact.word_of(decided), 0);
-    while exact.word_of(decided) == word {
-        let cell = &exact.cells()[decided];
-        let cells_before = (active & ((1 << cell.bit) - 1)).count_ones() as usize;
-        let at = of_word.start + cells_before - flushed;
-        match cell.change {
-            Change::Code(code) => codes[at] = code,
-            Change::Made { first_interior, start, count } => {
-                flush::<S>(&codes[..at], counters, indices);
-                add(usize::from(codes[at]), exact.triangles(start, count), first_interior, counters, indices);
-                codes.copy_within(at + 1..of_word.end, 0);
-                of_word.end -= at + 1;
-                flushed += at + 1;
-            }
+fn write<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>) {
+    for codes in codes.chunks(AT_ONCE) {
+        let kept = S::triangles(&RECIPES, codes, counters, room(indices, 16 * codes.len()));
+        // SAFETY: the backend has written them.
+        #[expect(unsafe_code, reason = "spares filling the vector with zeros first")]
+        unsafe {
+            keep(indices, kept);
         }
-        decided += 1;
     }
-    (of_word.end, decided)
 }
 
 /// Writes the triangles of a cell that was made, and takes the counters past it.

@@ -6,7 +6,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, Job, Recipe, Simd, all};
+use super::{CODES, FACE_CORNERS, Job, Recipe, Simd, all};
 
 pub(super) fn is_available() -> bool {
     all!("avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vbmi2", "bmi1", "bmi2", "lzcnt", "popcnt")
@@ -57,6 +57,12 @@ impl Simd for Avx512 {
     fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
         // SAFETY: within `run`.
         unsafe { self::cases(corners, active, cases) }
+    }
+
+    #[inline(always)]
+    fn larger_products(weights: &[f64; 8]) -> [u8; 2] {
+        // SAFETY: within `run`.
+        unsafe { self::larger_products(weights) }
     }
 
     #[inline(always)]
@@ -165,6 +171,24 @@ fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
         unsafe { _mm512_storeu_si512(cases[32..].as_mut_ptr().cast(), high) }
     }
     count
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn larger_products(weights: &[f64; 8]) -> [u8; 2] {
+    // SAFETY: the loads are all of the eight weights, and of the eight faces' corners.
+    let [a, b, c, d] = unsafe {
+        let weights = _mm512_loadu_pd(weights.as_ptr());
+        FACE_CORNERS
+            .each_ref()
+            .map(|of_faces| _mm512_permutexvar_pd(_mm512_loadu_si512(of_faces.as_ptr().cast()), weights))
+    };
+    let (first, second) = (_mm512_mul_pd(a, c), _mm512_mul_pd(b, d));
+    let is_larger = |product, other| {
+        let is_finite = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(product, _mm512_set1_pd(f64::INFINITY));
+        _mm512_mask_cmp_pd_mask::<_CMP_GT_OQ>(is_finite, product, other)
+    };
+    [is_larger(first, second), is_larger(second, first)]
 }
 
 #[inline]

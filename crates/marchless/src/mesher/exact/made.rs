@@ -12,17 +12,19 @@ use crate::{
     cases::Loops,
     cell::{CaseIndex, Edge},
     math::sqrt_f64,
-    mesher::{output::Bounds, vertices::crossing_fraction},
+    mesher::output::Bounds,
     sample::Weight,
 };
 
 /// Vertices in the middle of a disc stay this far from the faces of the cell.
 const LEAST_DEPTH: f64 = 1.0 / 16.0;
 
+/// Steps towards the surface end with one as short as this.
+const CLOSE_ENOUGH: f64 = 1.0 / 256.0;
+
 impl<W: Weight> Open<'_, W> {
     /// Makes the cell's vertices in its interior and appends the cell's triangles: a tunnel's where there is a waist and
     /// it can be told what is to be joined, and those of `outcome` otherwise. Returns how many vertices there are.
-    #[cold]
     #[inline(never)]
     pub(super) fn make(
         &self,
@@ -50,23 +52,11 @@ impl<W: Weight> Open<'_, W> {
         }
         let mut mean = [0.0; 3];
         for &edge in sheets.rim() {
-            let crossing = self.crossing(edge);
+            let crossing = field.crossing(edge);
             mean = [0, 1, 2].map(|axis| mean[axis] + crossing[axis] / sheets.rim().len() as f64);
         }
         self.vertex(&field, field.nearest_to(mean), bounds, out);
         1
-    }
-
-    /// Where the surface crosses an edge.
-    fn crossing(&self, edge: Edge) -> [f64; 3] {
-        let at = self.lattice.index(self.x, self.y);
-        let [low, high] = edge.corners().map(|corner| {
-            let [x, y, z] = corner.offset().map(usize::from);
-            self.planes.slabs[1 + z][at + x + y * self.lattice.stride]
-        });
-        let mut crossing = edge.corners()[0].offset().map(f64::from);
-        crossing[edge.axis()] = f64::from(crossing_fraction(low, high, self.settings.isovalue * W::SCALE));
-        crossing
     }
 
     /// Appends a vertex to the mesh. `at`: in the cell.
@@ -141,7 +131,11 @@ impl Trilinear {
             if !step.is_finite() {
                 break;
             }
+            let before = point;
             point = [0, 1, 2].map(|axis| (point[axis] - step * gradient[axis]).clamp(LEAST_DEPTH, 1.0 - LEAST_DEPTH));
+            if (0..3).all(|axis| (point[axis] - before[axis]).abs() < CLOSE_ENOUGH) {
+                break;
+            }
         }
         point
     }
@@ -201,7 +195,7 @@ impl Tunnel {
 /// How points of a straightened cell, joined in order, turn around the cell's diagonal from corner `end`: positive one way,
 /// negative the other.
 fn turn(points: &[[f64; 3]], end: usize) -> f64 {
-    let from_middle = |index: usize| points[index % points.len()].map(|v| v - 0.5);
+    let from_middle = |index: usize| points[index % points.len()].map(|v| v - 1.5);
     let diagonal: [f64; 3] = core::array::from_fn(|axis| if end >> axis & 1 == 1 { -1.0 } else { 1.0 });
     let area = |index: usize| {
         let ([a, b, c], [d, e, f]) = (from_middle(index), from_middle(index + 1));

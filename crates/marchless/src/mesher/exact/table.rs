@@ -18,11 +18,6 @@ impl Outcome {
     /// That of the case without inside corners.
     const NONE: Self = Self(0);
 
-    /// Whether it is anything else than the triangles of this case.
-    pub(super) const fn differs_from(self, case: CaseIndex) -> bool {
-        self.0 != case.0 as u16
-    }
-
     pub(super) const fn is_made(self) -> bool {
         self.0 & Self::MADE != 0
     }
@@ -31,14 +26,19 @@ impl Outcome {
         self.0 & Self::TUNNEL != 0
     }
 
-    /// The code of its triangles, where it is neither made nor has a tunnel.
-    pub(super) const fn code(self) -> u16 {
+    /// The code of its triangles, where it is neither made nor has a tunnel; that of the case where it is made.
+    #[inline(always)]
+    pub(super) const fn code_or(self, case: CaseIndex) -> u16 {
+        if self.is_made() { case.0 as u16 } else { self.number() }
+    }
+
+    const fn number(self) -> u16 {
         self.0 & !(Self::MADE | Self::TUNNEL)
     }
 
     /// Its triangles, where it is made.
     pub(super) fn sheets(self) -> &'static Sheets {
-        &SHEETS[usize::from(self.code()) % SHEETS.len()]
+        &SHEETS[usize::from(self.number()) % SHEETS.len()]
     }
 }
 
@@ -125,9 +125,12 @@ pub(in crate::mesher) const fn extra_triangles(number: usize) -> (u8, [[Edge; 3]
     }
 }
 
-/// The faces of a case that are ambiguous, a bit each.
-pub(super) const fn ambiguous_faces(case: CaseIndex) -> u8 {
-    AMBIGUOUS_FACES[case.0 as usize]
+/// A bit for each ambiguous face of a case whose inside corners are joined. `larger`: a bit for each face of which the
+/// first and third corners' weights have the larger product, and of which the second's and fourth's have.
+#[inline(always)]
+pub(super) const fn joined_faces(case: CaseIndex, larger: [u8; 2]) -> u8 {
+    let [first_inside, second_inside] = AMBIGUOUS_FACES[case.0 as usize];
+    larger[0] & first_inside | larger[1] & second_inside
 }
 
 /// What becomes of a case; `joined`: a bit for each of its ambiguous faces whose inside corners are joined.
@@ -135,26 +138,14 @@ pub(super) const fn outcome(case: CaseIndex, joined: u8) -> Outcome {
     OUTCOMES[case.0 as usize][joined as usize % 64]
 }
 
-/// The corners of each face, around it.
-pub(super) const FACE_CORNERS: [[usize; 4]; 6] = {
-    let (mut all, mut face) = ([[0; 4]; 6], 0);
-    while face < 6 {
-        let mut corner = 0;
-        while corner < 4 {
-            all[face][corner] = Face::ALL[face].corners()[corner].index();
-            corner += 1;
-        }
-        face += 1;
-    }
-    all
-};
-
-static AMBIGUOUS_FACES: [u8; 256] = {
-    let (mut all, mut case) = ([0; 256], 0);
+/// The ambiguous faces of a case, a bit each: those whose first corner is inside, and those whose second is.
+static AMBIGUOUS_FACES: [[u8; 2]; 256] = {
+    let (mut all, mut case) = ([[0; 2]; 256], 0);
     while case < 256 {
         let mut face = 0;
         while face < 6 {
-            all[case] |= (CaseIndex(case as u8).is_ambiguous(Face::ALL[face]) as u8) << face;
+            let second_inside = case >> Face::ALL[face].corners()[1].index() & 1;
+            all[case][second_inside] |= (CaseIndex(case as u8).is_ambiguous(Face::ALL[face]) as u8) << face;
             face += 1;
         }
         case += 1;
@@ -188,7 +179,7 @@ const TABLE: Table = {
     while case < 256 {
         let mut joined = 0;
         while joined < 64 {
-            if joined & !AMBIGUOUS_FACES[case] == 0 {
+            if joined & !(AMBIGUOUS_FACES[case][0] | AMBIGUOUS_FACES[case][1]) == 0 {
                 table.outcomes[case][joined as usize] = table.decided(CaseIndex(case as u8), joined);
             }
             joined += 1;
@@ -219,7 +210,8 @@ impl Table {
 /// Whether the trilinear interpolant can join two of these loops by a tunnel: two loops, but of two of three crossings only
 /// those at the ends of a diagonal of the cell, and none of nine; or of three loops the one of six and another.
 const fn may_have_tunnel(case: CaseIndex, loops: &Loops) -> bool {
-    let is_open = AMBIGUOUS_FACES[case.0 as usize] != 0;
+    let [first_inside, second_inside] = AMBIGUOUS_FACES[case.0 as usize];
+    let is_open = first_inside | second_inside != 0;
     match loops.count {
         2 => {
             let (a, b) = (loops.get(0).len(), loops.get(1).len());
@@ -236,9 +228,9 @@ mod tests {
 
     #[test]
     fn a_hundred_and_twenty_eight_cases_are_open() {
-        let ambiguous = (0..256).filter(|&case| AMBIGUOUS_FACES[case] != 0).count();
+        let ambiguous = (0..256).filter(|&case| AMBIGUOUS_FACES[case] != [0; 2]).count();
         let diagonal = (0..256)
-            .filter(|&case| AMBIGUOUS_FACES[case] == 0 && outcome(CaseIndex(case as u8), 0).may_have_tunnel())
+            .filter(|&case| AMBIGUOUS_FACES[case] == [0; 2] && outcome(CaseIndex(case as u8), 0).may_have_tunnel())
             .count();
         assert_eq!((ambiguous, diagonal), (120, 8));
     }

@@ -18,6 +18,8 @@
 //! Two roots may be as close as floating point allows. The ring's corners are kept apart and away from the faces, and
 //! since its sides run along the axes, none can be in line with a crossing on an edge: no triangle has zero area.
 
+#[cfg(doc)]
+use crate::simd::Simd;
 use crate::{math::sqrt_f64, mesher::vertices::MARGIN};
 
 /// The box around a tunnel's waist: from and to, per axis, in the cell's coordinates.
@@ -33,22 +35,35 @@ const MOST: usize = 12;
 /// side of the crossings it is.
 const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
 
+/// Whether a cell may have a [waist], by its faces' [larger products](Simd::larger_products): that none of the parabolas
+/// changes its sign from one face to the other.
+#[inline(always)]
+pub(super) const fn is_possible([first_larger, second_larger]: [u8; 2]) -> bool {
+    let alike = first_larger & first_larger >> 1 | second_larger & second_larger >> 1;
+    alike & 0b01_01_01 == 0b01_01_01
+}
+
 /// The waist of the tunnel between the sheets of a cell with these weights at its corners, where there are several
 /// sheets and two are joined.
 pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
-    let [a, b, c, d, e, f, g, h] = *weights;
-    let parabolas = [
-        Parabola::between([a, c, g, e], [b, d, h, f]),
-        Parabola::between([a, e, f, b], [c, g, h, d]),
-        Parabola::between([a, b, d, c], [e, f, h, g]),
-    ];
+    let [x, y, z] = parabolas(weights);
     // All at once: which of them fails first is anyone's guess.
-    if parabolas[0].has_roots_within() & parabolas[1].has_roots_within() & parabolas[2].has_roots_within() {
-        let waist = parabolas.map(|parabola| parabola.roots());
+    if x.has_roots_within() & y.has_roots_within() & z.has_roots_within() {
+        let waist = [x, y, z].map(|parabola| parabola.roots());
         let has_room = |&[from, to]: &[f64; 2]| from > LEAST_ROOM && to < 1.0 - LEAST_ROOM;
         return waist.iter().all(has_room).then_some(waist);
     }
     None
+}
+
+#[inline(always)]
+const fn parabolas(weights: &[f64; 8]) -> [Parabola; 3] {
+    let [a, b, c, d, e, f, g, h] = *weights;
+    [
+        Parabola::between([a, c, g, e], [b, d, h, f]),
+        Parabola::between([a, e, f, b], [c, g, h, d]),
+        Parabola::between([a, b, d, c], [e, f, h, g]),
+    ]
 }
 
 /// `low·(1 − t)² + mixed·(1 − t)·t + high·t²`
@@ -61,6 +76,7 @@ struct Parabola {
 
 impl Parabola {
     /// q between two slices, each given by its corners, around it.
+    #[inline(always)]
     const fn between(low: [f64; 4], high: [f64; 4]) -> Self {
         Self {
             low: low[0] * low[2] - low[1] * low[3],
@@ -69,11 +85,13 @@ impl Parabola {
         }
     }
 
+    #[inline(always)]
     const fn discriminant(&self) -> f64 {
         self.mixed * self.mixed - 4.0 * self.low * self.high
     }
 
     /// Whether there are two roots, and both lie between 0 and 1. NaN makes every comparison false.
+    #[inline(always)]
     const fn has_roots_within(&self) -> bool {
         let Self { low, mixed, high } = *self;
         let discriminant = self.discriminant();
@@ -103,19 +121,19 @@ pub(super) const fn ring(end: usize) -> [usize; RING] {
     [end ^ 1, end ^ 3, end ^ 2, end ^ 6, end ^ 4, end ^ 5]
 }
 
-/// Where a point of the cell would be if the waist filled the middle third of the cell. What has to be joined with
-/// what depends on the order of things along the axes alone, and is plain to see there however thin the waist is.
+/// Where a point of the cell would be if the cell were 3 long, with the waist in its middle third. What has to be joined
+/// with what depends on the order of things along the axes alone, and is plain to see there however thin the waist is.
 pub(super) fn straightened(point: [f64; 3], waist: &Waist) -> [f64; 3] {
     core::array::from_fn(|axis| {
         let ([from, to], at) = (waist[axis], point[axis]);
-        let thirds = if at < from {
-            at / from
+        let (third, [start, end]) = if at < from {
+            (0.0, [0.0, from])
         } else if at <= to {
-            1.0 + (at - from) / (to - from)
+            (1.0, [from, to])
         } else {
-            2.0 + (at - to) / (1.0 - to)
+            (2.0, [to, 1.0])
         };
-        thirds / 3.0
+        third + (at - start) / (end - start)
     })
 }
 
@@ -128,17 +146,21 @@ pub(super) fn strip(
     (around_names, ring_names): (&[u8], &[u8; RING]),
 ) -> Option<Strip> {
     let len = around.len();
-    let distance = |i: usize, j: usize| squared_distance(around[i % len], ring[j % RING]);
-    let start = (0..RING).min_by(|&a, &b| distance(0, a).total_cmp(&distance(0, b)))?;
+    let mut distances = [[0.0; RING]; MOST];
+    for (distances, &from) in distances.iter_mut().zip(around) {
+        *distances = ring.map(|to| squared_distance(from, to));
+    }
+    let start = (0..RING).min_by(|&a, &b| distances[0][a].total_cmp(&distances[0][b]))?;
     // The least sum up to corner `i` of the loop and `j` of the ring, and whether the last step was the loop's.
-    let (mut sums, mut along) = ([[f64::INFINITY; RING + 1]; MOST + 1], [[false; RING + 1]; MOST + 1]);
+    let (mut sums, mut along) = ([f64::INFINITY; RING + 1], [[false; RING + 1]; MOST + 1]);
     for i in 0..=len {
+        let mut after_ring = f64::INFINITY;
         for j in 0..=RING {
-            let after_loop = if i > 0 { sums[i - 1][j] } else { f64::INFINITY };
-            let after_ring = if j > 0 { sums[i][j - 1] } else { f64::INFINITY };
+            let after_loop = sums[j];
             let before = if i + j == 0 { 0.0 } else { after_loop.min(after_ring) };
-            sums[i][j] = before + distance(i, start + j);
             along[i][j] = j == 0 || i > 0 && after_loop <= after_ring;
+            after_ring = before + distances[i % len][(start + j) % RING];
+            sums[j] = after_ring;
         }
     }
     let mut strip = Strip { triangles: [[0; 3]; MOST + RING], count: 0 };
