@@ -92,6 +92,7 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod bits;
 mod brush;
 mod buffer;
 pub mod cases;

@@ -38,6 +38,7 @@ use crate::{
     sample::Weight,
     simd::Backend,
 };
+pub(crate) use classify::sign_row;
 pub(crate) use slabs::Meshing;
 use slabs::{Input, Lattice, Slabs};
 pub use stream::SlabMesher;

@@ -3,6 +3,7 @@
 use core::fmt::Debug;
 
 use crate::{
+    bits::SignRows,
     mesher::{MeshError, Meshing},
     simd::{Backend, Simd, dispatch},
 };
@@ -54,6 +55,7 @@ pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private:
 /// What the passes need of a weight, out of the users' reach.
 pub(crate) mod private {
     use crate::{
+        bits::SignRows,
         mesher::{MeshError, Meshing},
         simd::{Backend, Simd},
     };
@@ -95,6 +97,8 @@ pub(crate) mod private {
         /// Meshes slabs. Here, and not generic, so that the passes are compiled in this crate, once, with its level of
         /// optimisation.
         fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError>;
+        /// Packs signs, here for the same reason.
+        fn pack(backend: Backend, rows: SignRows<'_, Self>);
     }
 }
 
@@ -214,6 +218,10 @@ macro_rules! integer_weight {
             fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError> {
                 dispatch(backend, meshing)
             }
+
+            fn pack(backend: Backend, rows: SignRows<'_, Self>) {
+                dispatch(backend, rows);
+            }
         }
     };
 }
@@ -324,6 +332,10 @@ impl private::Sealed for f32 {
 
     fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError> {
         dispatch(backend, meshing)
+    }
+
+    fn pack(backend: Backend, rows: SignRows<'_, Self>) {
+        dispatch(backend, rows);
     }
 }
 

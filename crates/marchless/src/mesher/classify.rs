@@ -49,9 +49,7 @@ impl Signs {
         } else {
             for (y, words) in self.signs.chunks_exact_mut(lattice.words).enumerate() {
                 let row = &plane[lattice.origin + y * lattice.stride..];
-                for (index, word) in words.iter_mut().enumerate() {
-                    *word = sign_word::<S, W>(&row[64 * index..], (width - 64 * index).min(64), threshold);
-                }
+                sign_row::<S, W>(row, width, threshold, words);
             }
         }
         self.shift(lattice);
@@ -128,6 +126,15 @@ pub(super) fn alike<S: Simd, W: Weight>(samples: &[W], threshold: W::Threshold) 
         None => others |= u32::from(rest.iter().any(|weight| weight.inside(threshold) != inside)),
     }
     samples.len() - if others == 0 { 0 } else { rest.len() }
+}
+
+/// The signs of the first `count` samples, as many as fill all `words` but for a part of the last one; what is behind
+/// them is read, too, where it is there.
+#[inline(always)]
+pub(crate) fn sign_row<S: Simd, W: Weight>(samples: &[W], count: usize, threshold: W::Threshold, words: &mut [u64]) {
+    for (index, word) in words.iter_mut().enumerate() {
+        *word = sign_word::<S, W>(&samples[64 * index..], (count - 64 * index).min(64), threshold);
+    }
 }
 
 /// The signs of the first `count` samples, 1 to 64; what is behind them is read, too, where it is there.

@@ -1,0 +1,256 @@
+//! A three-dimensional grid of bits, and operations on all of it that cost a few word operations a row.
+
+mod automaton;
+mod case_masks;
+mod components;
+mod connectivity;
+mod flood;
+mod logic;
+mod materials;
+mod mesh;
+mod morphology;
+mod overlap;
+mod samples;
+mod shift;
+mod tile;
+
+use alloc::vec::Vec;
+
+use thiserror::Error;
+
+use crate::{
+    lattice::{Samples, Shape},
+    sample::Weight,
+    simd::Backend,
+};
+pub use connectivity::Connectivity;
+pub(crate) use samples::SignRows;
+
+/// One bit for each lattice point.
+///
+/// Bits are kept in rows of 64-bit words along x: bit `x % 64` of word `x / 64` of row `y + ny·z` is the point `[x, y,
+/// z]`. A row starts with a new word; what is left of its last word is zero.
+///
+/// ```
+/// use marchless::{Shape, bits::BitGrid};
+///
+/// let ball = BitGrid::from_fn(Shape::cube(100)?, |p| p.map(|v| (v as i32 - 50).pow(2)).iter().sum::<i32>() < 40 * 40)?;
+/// assert!(ball.get([50, 50, 50]) && !ball.get([0, 0, 0]));
+/// assert_eq!(ball.count(), ball.iter().count());
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct BitGrid {
+    shape: Shape,
+    /// Words a row.
+    row: usize,
+    words: Vec<u64>,
+}
+
+impl BitGrid {
+    /// A grid of zeros.
+    ///
+    /// # Errors
+    /// [`BitsError::TooLarge`] where memory does not hold it.
+    pub fn new(shape: Shape) -> Result<Self, BitsError> {
+        Self::filled(shape, false)
+    }
+
+    /// A grid of bits that all have this value.
+    ///
+    /// # Errors
+    /// [`BitsError::TooLarge`] where memory does not hold it.
+    pub fn filled(shape: Shape, value: bool) -> Result<Self, BitsError> {
+        let [nx, ny, nz] = shape.size().map(|size| size as usize);
+        let row = nx.div_ceil(64);
+        let too_large = BitsError::TooLarge { shape };
+        let len = ny.checked_mul(nz).and_then(|rows| rows.checked_mul(row)).ok_or(too_large)?;
+        let mut words = Vec::new();
+        words.try_reserve_exact(len).map_err(|_| too_large)?;
+        words.resize(len, if value { u64::MAX } else { 0 });
+        let mut grid = Self { shape, row, words };
+        if value {
+            grid.clear_unused();
+        }
+        Ok(grid)
+    }
+
+    /// The grid of what `is_set` says of each point.
+    ///
+    /// # Errors
+    /// [`BitsError::TooLarge`] where memory does not hold it.
+    pub fn from_fn(shape: Shape, mut is_set: impl FnMut([u32; 3]) -> bool) -> Result<Self, BitsError> {
+        let mut grid = Self::new(shape)?;
+        let [nx, ny, _] = shape.size();
+        for (number, row) in grid.words.chunks_exact_mut(grid.row).enumerate() {
+            let (y, z) = ((number % ny as usize) as u32, (number / ny as usize) as u32);
+            for x in 0..nx {
+                row[x as usize / 64] |= u64::from(is_set([x, y, z])) << (x % 64);
+            }
+        }
+        Ok(grid)
+    }
+
+    /// The grid of the samples that are inside: whose weight is below `isovalue`, in voxels and finite. Of
+    /// [padded](Samples::padded) samples, the padding is left out.
+    ///
+    /// # Errors
+    /// [`BitsError::TooLarge`] where memory does not hold it, [`BitsError::OnlyPadding`] where padding is all there is,
+    /// [`BitsError::IsovalueNotFinite`].
+    pub fn from_samples<W: Weight>(samples: Samples<'_, W>, isovalue: f32) -> Result<Self, BitsError> {
+        if !isovalue.is_finite() {
+            return Err(BitsError::IsovalueNotFinite { isovalue });
+        }
+        let padding = u32::from(samples.is_padded());
+        let given = samples.shape();
+        let size = given.size().map(|size| size.saturating_sub(2 * padding));
+        let shape = Shape::new(size).map_err(|_| BitsError::OnlyPadding { shape: given })?;
+        let mut grid = Self::new(shape)?;
+        W::pack(Backend::fastest(), SignRows { samples, padding: padding as usize, isovalue, grid: &mut grid });
+        Ok(grid)
+    }
+
+    /// Points per axis.
+    pub const fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// Whether the bit of a point is set; `false` outside the grid.
+    pub fn get(&self, position: [u32; 3]) -> bool {
+        self.place_of(position).is_some_and(|(word, bit)| self.words[word] >> bit & 1 == 1)
+    }
+
+    /// Sets the bit of a point.
+    ///
+    /// # Errors
+    /// [`BitsError::OutOfRange`] where the grid has no such point.
+    pub fn set(&mut self, position: [u32; 3], value: bool) -> Result<(), BitsError> {
+        let Some((word, bit)) = self.place_of(position) else {
+            return Err(BitsError::OutOfRange { position, shape: self.shape });
+        };
+        self.words[word] = self.words[word] & !(1 << bit) | u64::from(value) << bit;
+        Ok(())
+    }
+
+    /// How many bits are set.
+    pub fn count(&self) -> usize {
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// Whether no bit is set.
+    pub fn is_empty(&self) -> bool {
+        self.words.iter().all(|&word| word == 0)
+    }
+
+    /// Where bits are set, in the order of memory: x first, z last.
+    pub fn iter(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        let ny = self.shape.size()[1] as usize;
+        self.words.iter().enumerate().flat_map(move |(index, &word)| {
+            let (row, x) = (index / self.row, (index % self.row * 64) as u32);
+            let (y, z) = ((row % ny) as u32, (row / ny) as u32);
+            set_bits(word).map(move |bit| [x + bit, y, z])
+        })
+    }
+
+    /// All words, row by row.
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// Words a row.
+    pub const fn words_per_row(&self) -> usize {
+        self.row
+    }
+
+    /// The words of one row.
+    pub(crate) fn row(&self, y: u32, z: u32) -> &[u64] {
+        &self.words[self.row * (y as usize + self.shape.size()[1] as usize * z as usize)..][..self.row]
+    }
+
+    /// All words, to be changed. Who leaves something in the unused bits of a row's last word must
+    /// [clear](Self::clear_unused) them.
+    pub(crate) fn words_mut(&mut self) -> &mut [u64] {
+        &mut self.words
+    }
+
+    /// The bits of a row's last word that are points.
+    pub(crate) const fn last_word(&self) -> u64 {
+        let nx = self.shape.size()[0] as usize;
+        u64::MAX >> (64 * self.row - nx)
+    }
+
+    /// Zeros the bits that are no points.
+    pub(crate) fn clear_unused(&mut self) {
+        let last = self.last_word();
+        if last != u64::MAX {
+            for row in self.words.chunks_exact_mut(self.row) {
+                row[self.row - 1] &= last;
+            }
+        }
+    }
+
+    /// # Errors
+    /// [`BitsError::ShapesDiffer`] where the other grid has another shape.
+    pub(crate) fn same_shape(&self, other: &Self) -> Result<(), BitsError> {
+        if self.shape == other.shape {
+            return Ok(());
+        }
+        Err(BitsError::ShapesDiffer { expected: self.shape, found: other.shape })
+    }
+
+    /// A point's word and its bit there.
+    fn place_of(&self, [x, y, z]: [u32; 3]) -> Option<(usize, u32)> {
+        let [nx, ny, nz] = self.shape.size();
+        let row = y as usize + ny as usize * z as usize;
+        (x < nx && y < ny && z < nz).then(|| (self.row * row + x as usize / 64, x % 64))
+    }
+}
+
+/// The numbers of the set bits of a word, the lowest first.
+pub(crate) fn set_bits(mut word: u64) -> impl Iterator<Item = u32> {
+    core::iter::from_fn(move || {
+        let bit = (word != 0).then(|| word.trailing_zeros());
+        word &= word.wrapping_sub(1);
+        bit
+    })
+}
+
+/// Why an operation on bits could not be done.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum BitsError {
+    /// Memory does not hold the grid.
+    #[error("memory does not hold a grid of {shape} bits")]
+    TooLarge {
+        /// What was asked for.
+        shape: Shape,
+    },
+    /// Of padded samples, nothing but padding.
+    #[error("{shape} padded samples are nothing but padding: at least 3 per axis are needed")]
+    OnlyPadding {
+        /// The samples, padding included.
+        shape: Shape,
+    },
+    /// The isovalue must be finite.
+    #[error("the isovalue must be finite, but it is {isovalue}")]
+    IsovalueNotFinite {
+        /// What was given.
+        isovalue: f32,
+    },
+    /// Two grids must have the same shape.
+    #[error("a grid of {expected} bits was expected, but it has {found}")]
+    ShapesDiffer {
+        /// The shape of the grid operated on.
+        expected: Shape,
+        /// The shape of the other grid.
+        found: Shape,
+    },
+    /// The grid has no such point.
+    #[error("a grid of {shape} bits has no point {position:?}")]
+    OutOfRange {
+        /// What was given.
+        position: [u32; 3],
+        /// The grid's shape.
+        shape: Shape,
+    },
+}

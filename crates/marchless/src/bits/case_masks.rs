@@ -1,0 +1,1 @@
+//! The case index of every cell.

@@ -1,0 +1,1 @@
+//! Filling from seeds through a mask.

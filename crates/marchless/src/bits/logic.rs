@@ -1,0 +1,1 @@
+//! Boolean operations on whole grids.

@@ -1,0 +1,1 @@
+//! More than two materials: several bits for each point.

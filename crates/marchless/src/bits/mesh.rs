@@ -1,0 +1,1 @@
+//! From bits alone to a triangle mesh.

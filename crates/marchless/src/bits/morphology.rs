@@ -1,0 +1,1 @@
+//! Dilation, erosion, opening, closing.

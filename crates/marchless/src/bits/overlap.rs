@@ -1,0 +1,1 @@
+//! What a grid has in common with boxes, balls and other grids.

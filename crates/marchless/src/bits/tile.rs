@@ -1,0 +1,1 @@
+//! 8 × 8 × 8 bits in one cache line.
