@@ -25,6 +25,7 @@ use crate::{
 };
 pub use connectivity::Connectivity;
 pub(crate) use samples::SignRows;
+pub use tile::{Tile, TileGrid};
 
 /// One bit for each lattice point.
 ///
@@ -236,6 +237,12 @@ pub enum BitsError {
     IsovalueNotFinite {
         /// What was given.
         isovalue: f32,
+    },
+    /// A cell needs two points on each axis.
+    #[error("a grid of {shape} bits has no cells: at least 2 per axis are needed")]
+    TooSmall {
+        /// The grid's shape.
+        shape: Shape,
     },
     /// Two grids must have the same shape.
     #[error("a grid of {expected} bits was expected, but it has {found}")]

@@ -140,6 +140,26 @@ pub trait Simd {
     /// What is written behind them means nothing. Bit `x` of `corners[k]` is corner `k` of cell `x`.
     fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize;
 
+    /// The cases of 64 cells: bit `x` of `corners[k]` is corner `k` of cell `x`.
+    ///
+    /// A transposition: 8 × 64 bits become 64 × 8, first within each byte of all eight words at once, then byte by byte.
+    /// At each step, blocks on one side of the diagonal change places with those on the other.
+    #[inline(always)]
+    fn case_bytes(corners: [u64; 8]) -> [u8; 64] {
+        let mut words = corners;
+        for (apart, low) in [(4, 0x0F0F_0F0F_0F0F_0F0F), (2, 0x3333_3333_3333_3333), (1, 0x5555_5555_5555_5555)] {
+            swap_blocks(&mut words, apart, apart, low);
+        }
+        for (apart, low) in [(4, 0x0000_0000_FFFF_FFFF), (2, 0x0000_FFFF_0000_FFFF), (1, 0x00FF_00FF_00FF_00FF)] {
+            swap_blocks(&mut words, apart, 8 * apart, low);
+        }
+        let mut bytes = [0; 64];
+        for (bytes, word) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(words) {
+            *bytes = word.to_le_bytes();
+        }
+        bytes
+    }
+
     /// The products of the weights at opposite corners of a cell's faces: a bit for each face of which the product of the
     /// first and third corner is the larger one, and of which that of the second and fourth is. Neither where the larger
     /// one is infinite or one of them is NaN.
@@ -168,6 +188,17 @@ pub trait Simd {
         counters: &mut [u32; 8],
         indices: &mut [MaybeUninit<u32>],
     ) -> usize;
+}
+
+/// Exchanges the high part of each word with the low part of the word `apart` behind it: what `low` selects there, and
+/// `shift` further up here.
+#[inline(always)]
+fn swap_blocks(words: &mut [u64; 8], apart: usize, shift: usize, low: u64) {
+    for index in (0..8).filter(|index| index & apart == 0) {
+        let change = (words[index] >> shift ^ words[index + apart]) & low;
+        words[index] ^= change << shift;
+        words[index + apart] ^= change;
+    }
 }
 
 /// The first, second, third and fourth corner of each face, around it. In the places of a seventh and eighth face, the

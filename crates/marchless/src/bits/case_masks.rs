@@ -1,1 +1,190 @@
-//! The case index of every cell.
+//! The case index of every cell: eight bits that say which of its corners are set, which is what marching cubes looks
+//! up in its tables.
+//!
+//! There are two ways to make many of them at once, both of which ask no cell for its corners one by one:
+//!
+//! - *Shifted copies* ("Marchless Cubes: Bitfield SIMD Voxel Meshing"). Shifted down by one along an axis, the bits lie
+//!   where their neighbours lay, so that the grid and seven shifted copies of it hold the eight corners of all cells at
+//!   the same places. The bits of each copy are spread out, one to a byte; copy k's go to bit k. That takes eight
+//!   spreadings and eight ors, the same number of operations whatever the bits are, as long as the grid fits into
+//!   registers. [`Tile`](super::Tile) is such a grid.
+//! - *Word strides* (an article on building cell masks from rows of sign bits held in words along one axis). Four
+//!   passes over the rows, one for each edge of a cell that runs along them. A pass looks at each bit of a word; where it
+//!   is set, it sets one bit in the mask of each of the two cells that share that corner. Each row is read four times and
+//!   the masks are written up to four times, and there is a branch for each bit: words of zeros cost next to nothing,
+//!   and noise costs most.
+//!
+//! Ours takes the copies from the first and the words from the second. A row of cells has four rows of corners, and their
+//! words are four of the eight copies; the other four are the same words shifted by one, with the lowest bit of the next
+//! word on top. Eight words with the corners of 64 cells become 64 bytes by a transposition of 8 × 64 bits. Each mask is
+//! written once, the rows are short enough to be read from the nearest cache when they come again, and there is no
+//! branch that depends on a bit: the grid may be of any size, and what is in it makes no difference to the time.
+
+use alloc::vec::Vec;
+
+use super::{BitGrid, BitsError};
+use crate::simd::{Backend, Job, Simd, dispatch};
+
+impl BitGrid {
+    /// The case index of every cell, `[(nx − 1)·(ny − 1)·(nz − 1)]`, x fastest: bit k of a cell's byte is its
+    /// [`Corner`](crate::Corner) k, as in [`CaseIndex`](crate::CaseIndex).
+    ///
+    /// ```
+    /// use marchless::{Shape, bits::BitGrid};
+    ///
+    /// let mut grid = BitGrid::new(Shape::cube(3)?)?;
+    /// grid.set([1, 1, 1], true)?;
+    /// assert_eq!(grid.case_masks()?, [1 << 7, 1 << 6, 1 << 5, 1 << 4, 1 << 3, 1 << 2, 1 << 1, 1]);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BitsError::TooSmall`] where there are less than 2 points on an axis, [`BitsError::TooLarge`] where memory does
+    /// not hold the masks.
+    pub fn case_masks(&self) -> Result<Vec<u8>, BitsError> {
+        let mut masks = Vec::new();
+        self.case_masks_into(&mut masks)?;
+        Ok(masks)
+    }
+
+    /// As [`case_masks`](Self::case_masks), into a vector whose memory is used again. What was in it goes; on errors it
+    /// stays as it was.
+    ///
+    /// # Errors
+    /// As [`case_masks`](Self::case_masks).
+    pub fn case_masks_into(&self, masks: &mut Vec<u8>) -> Result<(), BitsError> {
+        self.case_masks_with(Backend::fastest(), masks)
+    }
+
+    fn case_masks_with(&self, backend: Backend, masks: &mut Vec<u8>) -> Result<(), BitsError> {
+        let shape = self.shape;
+        let cells = shape.size().map(|size| size as usize - 1);
+        if cells.contains(&0) {
+            return Err(BitsError::TooSmall { shape });
+        }
+        let len = cells.iter().product();
+        resize(masks, len).map_err(|()| BitsError::TooLarge { shape })?;
+        dispatch(backend, CaseMasks { grid: self, cells, masks });
+        Ok(())
+    }
+}
+
+/// Makes `masks` this long, as it was where memory does not hold that. What it holds then means nothing.
+pub(super) fn resize(masks: &mut Vec<u8>, len: usize) -> Result<(), ()> {
+    masks.try_reserve_exact(len.saturating_sub(masks.len())).map_err(|_| ())?;
+    masks.resize(len, 0);
+    Ok(())
+}
+
+/// All cells of a grid.
+struct CaseMasks<'a> {
+    grid: &'a BitGrid,
+    cells: [usize; 3],
+    masks: &'a mut [u8],
+}
+
+impl Job for CaseMasks<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { grid, cells: [nx, ny, nz], mut masks } = self;
+        for z in 0..nz as u32 {
+            for y in 0..ny as u32 {
+                let rows = [grid.row(y, z), grid.row(y + 1, z), grid.row(y, z + 1), grid.row(y + 1, z + 1)];
+                row_masks::<S>(rows, nx, masks);
+                masks = &mut masks[nx..];
+            }
+        }
+    }
+}
+
+/// The masks of one row of cells, at the start of `masks`, which holds those of the rows behind it as well: they may be
+/// overwritten.
+#[inline(always)]
+fn row_masks<S: Simd>(rows: [&[u64]; 4], cells: usize, masks: &mut [u8]) {
+    for word in 0..cells.div_ceil(64) {
+        let low = rows.map(|row| row[word]);
+        let next = rows.map(|row| row.get(word + 1).copied().unwrap_or(0));
+        let bytes = S::case_bytes(corners(low, next));
+        let masks = &mut masks[64 * word..];
+        match masks.first_chunk_mut::<64>() {
+            Some(block) => *block = bytes,
+            None => masks.copy_from_slice(&bytes[..masks.len()]),
+        }
+    }
+}
+
+/// The words of the eight corners of 64 cells, from those of the four rows on their low side and from what follows in
+/// these rows.
+#[inline(always)]
+fn corners(low: [u64; 4], next: [u64; 4]) -> [u64; 8] {
+    let [a, b, c, d] = low;
+    let [at_a, at_b, at_c, at_d] = core::array::from_fn(|row| low[row] >> 1 | next[row] << 63);
+    [a, at_a, b, at_b, c, at_c, d, at_d]
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+    use crate::{Corner, Shape};
+
+    /// A fair coin for each point.
+    fn grid(size: [u32; 3]) -> BitGrid {
+        let coin = |[x, y, z]: [u32; 3]| {
+            let hash = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 63 == 1
+        };
+        BitGrid::from_fn(Shape::new(size).expect("no size is 0"), coin).expect("it is small")
+    }
+
+    /// Corner by corner.
+    fn plain(grid: &BitGrid) -> Vec<u8> {
+        let [nx, ny, nz] = grid.shape().size();
+        let cells = (0..nz - 1).flat_map(|z| (0..ny - 1).flat_map(move |y| (0..nx - 1).map(move |x| [x, y, z])));
+        let mask = |cell: [u32; 3]| {
+            let set = |corner: &Corner| grid.get([0, 1, 2].map(|axis| cell[axis] + u32::from(corner.offset()[axis])));
+            Corner::ALL.iter().filter(|corner| set(corner)).map(|corner| 1 << corner.index()).sum()
+        };
+        cells.map(mask).collect()
+    }
+
+    #[test]
+    fn every_backend_gives_the_same_masks() {
+        for nx in [2, 3, 8, 31, 32, 33, 63, 64, 65, 66, 127, 128, 129, 130, 193] {
+            for [ny, nz] in [[2, 2], [3, 2], [2, 4], [4, 3]] {
+                let grid = grid([nx, ny, nz]);
+                let expected = plain(&grid);
+                for &backend in Backend::ALL {
+                    let mut masks = vec![0xA5; 7];
+                    grid.case_masks_with(backend, &mut masks).expect("it has cells");
+                    assert!(masks == expected, "{nx} × {ny} × {nz} on {}", backend.name());
+                }
+            }
+        }
+    }
+
+    /// All cases, each beside every other one.
+    #[test]
+    fn a_byte_for_each_of_64_columns() {
+        struct Bytes([u64; 8]);
+        impl Job for Bytes {
+            type Output = [u8; 64];
+            #[inline(always)]
+            fn run<S: Simd>(self) -> [u8; 64] {
+                S::case_bytes(self.0)
+            }
+        }
+        for first in 0..=255u8 {
+            let expected: [u8; 64] = core::array::from_fn(|cell| first.wrapping_add((cell * cell * 7 + cell) as u8));
+            let corners = core::array::from_fn(|corner| {
+                (0..64).map(|cell| u64::from(expected[cell] >> corner & 1) << cell).sum()
+            });
+            for &backend in Backend::ALL {
+                assert_eq!(dispatch(backend, Bytes(corners)), expected, "{}", backend.name());
+            }
+        }
+    }
+}

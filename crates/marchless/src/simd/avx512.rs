@@ -60,6 +60,12 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn case_bytes(corners: [u64; 8]) -> [u8; 64] {
+        // SAFETY: within `run`.
+        unsafe { self::case_bytes(corners) }
+    }
+
+    #[inline(always)]
     fn larger_products(weights: &[f64; 8]) -> [u8; 2] {
         // SAFETY: within `run`.
         unsafe { self::larger_products(weights) }
@@ -171,6 +177,18 @@ fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize {
         unsafe { _mm512_storeu_si512(cases[32..].as_mut_ptr().cast(), high) }
     }
     count
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw")]
+fn case_bytes(corners: [u64; 8]) -> [u8; 64] {
+    let (mut dense, mut bytes) = ([0; 64], _mm512_setzero_si512());
+    for (corner, signs) in corners.into_iter().enumerate() {
+        bytes = _mm512_mask_add_epi8(bytes, signs, bytes, _mm512_set1_epi8((1u8 << corner) as i8));
+    }
+    // SAFETY: the store is all of the 64 bytes.
+    unsafe { _mm512_storeu_si512(dense.as_mut_ptr().cast(), bytes) }
+    dense
 }
 
 #[inline]
