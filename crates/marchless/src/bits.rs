@@ -10,6 +10,7 @@ mod materials;
 mod mesh;
 mod morphology;
 mod overlap;
+mod paste;
 mod samples;
 mod shift;
 mod tile;
