@@ -11,11 +11,12 @@ mod mesh;
 mod morphology;
 mod overlap;
 mod paste;
+mod runs;
 mod samples;
 mod shift;
 mod tile;
 
-use alloc::vec::Vec;
+use alloc::{vec, vec::Vec};
 
 use thiserror::Error;
 
@@ -24,6 +25,7 @@ use crate::{
     sample::Weight,
     simd::Backend,
 };
+pub use components::{Component, Components};
 pub use connectivity::Connectivity;
 pub(crate) use samples::SignRows;
 pub use tile::{Tile, TileGrid};
@@ -56,6 +58,13 @@ impl BitGrid {
     /// [`BitsError::TooLarge`] where memory does not hold it.
     pub fn new(shape: Shape) -> Result<Self, BitsError> {
         Self::filled(shape, false)
+    }
+
+    /// A grid of zeros, of a shape that another grid has or had.
+    pub(crate) fn empty(shape: Shape) -> Self {
+        let [nx, ny, nz] = shape.size().map(|size| size as usize);
+        let row = nx.div_ceil(64);
+        Self { shape, row, words: vec![0; row * ny * nz] }
     }
 
     /// A grid of bits that all have this value.

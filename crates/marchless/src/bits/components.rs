@@ -1,1 +1,232 @@
 //! Connected components.
+//!
+//! A component is made of runs of set bits, which are found a word at a time; runs of neighbouring rows that touch are
+//! joined by union–find. A run's root is the first of its component, so that the last pass, which numbers the
+//! components, meets a root before what belongs to it.
+
+use alloc::vec::Vec;
+
+use super::{
+    BitGrid, Connectivity,
+    runs::{Runs, span_words},
+};
+use crate::lattice::{Region, Shape};
+
+/// The connected components of a grid's set points, numbered by their first points in the order of memory.
+///
+/// ```
+/// use marchless::{Shape, bits::{BitGrid, Connectivity}};
+///
+/// let grid = BitGrid::from_fn(Shape::cube(9)?, |[x, y, z]| x != 4 && y != 6 && z < 9)?;
+/// let components = grid.components(Connectivity::Six);
+/// assert_eq!(components.len(), 4);
+/// assert_eq!(components.get(3).map(|component| component.size), Some(4 * 2 * 9));
+/// assert_eq!(components.label([0, 8, 8]), Some(2));
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+///
+/// Memory is in proportion to the runs of set bits and to the rows, not to the points.
+#[derive(Clone, Debug)]
+pub struct Components {
+    shape: Shape,
+    runs: Runs,
+    /// For each run, the number of its component.
+    labels: Vec<usize>,
+    components: Vec<Component>,
+}
+
+/// What is known of a connected component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Component {
+    /// How many points it has.
+    pub size: usize,
+    /// The smallest region that holds it; coordinates that `i32` lacks become the highest one.
+    pub bounds: Region,
+    /// Its first point in the order of memory: that of the lowest z, among these of the lowest y, then of the lowest x.
+    pub first: [u32; 3],
+}
+
+impl BitGrid {
+    /// The connected components of the set points.
+    pub fn components(&self, connectivity: Connectivity) -> Components {
+        let runs = Runs::of(self);
+        let mut parents: Vec<usize> = (0..runs.spans.len()).collect();
+        let [_, ny, nz] = self.shape.size().map(|size| size as usize);
+        let faces = u32::from(connectivity != Connectivity::Six);
+        let edges = u32::from(connectivity == Connectivity::TwentySix);
+        for z in 0..nz {
+            for y in 0..ny {
+                let row = y + ny * z;
+                let mut join = |other, reach| join_rows(&runs, [row, other], reach, &mut parents);
+                if y > 0 {
+                    join(row - 1, faces);
+                }
+                if z > 0 {
+                    join(row - ny, faces);
+                    if connectivity != Connectivity::Six {
+                        if y > 0 {
+                            join(row - ny - 1, edges);
+                        }
+                        if y + 1 < ny {
+                            join(row - ny + 1, edges);
+                        }
+                    }
+                }
+            }
+        }
+        number(self.shape, runs, parents)
+    }
+}
+
+/// Joins the runs of two rows that overlap, or that would if one of them were `reach` longer at both ends.
+fn join_rows(runs: &Runs, rows: [usize; 2], reach: u32, parents: &mut [usize]) {
+    let [mut a, mut b] = rows.map(|row| runs.starts[row]);
+    let ends = rows.map(|row| runs.starts[row + 1]);
+    while a < ends[0] && b < ends[1] {
+        let ([start_a, end_a], [start_b, end_b]) = (runs.spans[a], runs.spans[b]);
+        // An end is at most `u32::MAX`, and a start below one.
+        if start_a < end_b.saturating_add(reach) && start_b < end_a.saturating_add(reach) {
+            union(parents, a, b);
+        }
+        // Between a run and the next is a point, so that the one that ends first touches nothing more.
+        if end_a < end_b {
+            a += 1;
+        } else {
+            b += 1;
+        }
+    }
+}
+
+/// Makes one set of those that two runs are in. A parent is never behind its child.
+fn union(parents: &mut [usize], a: usize, b: usize) {
+    let (a, b) = (root(parents, a), root(parents, b));
+    parents[a.max(b)] = a.min(b);
+}
+
+/// The first run of a set, as far as it is known; halves the way to it.
+fn root(parents: &mut [usize], mut run: usize) -> usize {
+    while parents[run] != run {
+        parents[run] = parents[parents[run]];
+        run = parents[run];
+    }
+    run
+}
+
+/// Makes numbers of components out of parents, and counts and bounds what belongs to each.
+fn number(shape: Shape, runs: Runs, mut parents: Vec<usize>) -> Components {
+    let ny = shape.size()[1] as usize;
+    let saturated = |v: u32| i32::try_from(v).unwrap_or(i32::MAX);
+    let mut components: Vec<Component> = Vec::new();
+    for (row, bounds) in runs.starts.windows(2).enumerate() {
+        let (y, z) = ((row % ny) as u32, (row / ny) as u32);
+        for run in bounds[0]..bounds[1] {
+            let [start, end] = runs.spans[run];
+            let min = [start, y, z].map(saturated);
+            let max = [end, y + 1, z + 1].map(saturated);
+            if parents[run] == run {
+                parents[run] = components.len();
+                components.push(Component {
+                    size: (end - start) as usize,
+                    bounds: Region { min, max },
+                    first: [start, y, z],
+                });
+            } else {
+                // The parent came before, and is a number by now.
+                parents[run] = parents[parents[run]];
+                let component = &mut components[parents[run]];
+                component.size += (end - start) as usize;
+                component.bounds = component.bounds.union(&Region { min, max });
+            }
+        }
+    }
+    Components { shape, runs, labels: parents, components }
+}
+
+impl Components {
+    /// How many there are.
+    pub const fn len(&self) -> usize {
+        self.components.len()
+    }
+
+    /// Whether there is none: no point is set.
+    pub const fn is_empty(&self) -> bool {
+        self.components.is_empty()
+    }
+
+    /// One of them, by its number.
+    pub fn get(&self, index: usize) -> Option<&Component> {
+        self.components.get(index)
+    }
+
+    /// All of them, by their numbers.
+    pub fn iter(&self) -> core::slice::Iter<'_, Component> {
+        self.components.iter()
+    }
+
+    /// The number of the one with the most points, of several the first; `None` where there is none.
+    pub fn largest(&self) -> Option<usize> {
+        let most = self.components.iter().map(|component| component.size).max()?;
+        self.components.iter().position(|component| component.size == most)
+    }
+
+    /// The number of the one that a point belongs to; `None` where the point is not set, or outside the grid.
+    pub fn label(&self, [x, y, z]: [u32; 3]) -> Option<usize> {
+        let [_, ny, nz] = self.shape.size();
+        if y >= ny || z >= nz {
+            return None;
+        }
+        let row = y as usize + ny as usize * z as usize;
+        let (first, behind) = (self.runs.starts[row], self.runs.starts[row + 1]);
+        let run = first + self.runs.spans[first..behind].partition_point(|&[_, end]| end <= x);
+        (run < behind && self.runs.spans[run][0] <= x).then(|| self.labels[run])
+    }
+
+    /// The points of one of them, in a grid as large as the whole; nothing where there is none of that number.
+    pub fn mask(&self, index: usize) -> BitGrid {
+        let mut grid = BitGrid::empty(self.shape);
+        let Some(Component { bounds, .. }) = self.get(index) else { return grid };
+        let [_, ny, nz] = self.shape.size();
+        // Where the highest coordinate that `i32` has stands for higher ones, up to the end of the grid.
+        let rows = |axis: usize, size: u32| {
+            let [min, max] = [bounds.min[axis], bounds.max[axis]];
+            min as u32..if max == i32::MAX { size } else { max as u32 }
+        };
+        for z in rows(2, nz) {
+            for y in rows(1, ny) {
+                self.write_row(y as usize + ny as usize * z as usize, |label| label == index, &mut grid);
+            }
+        }
+        grid
+    }
+
+    /// The points of those that `keep` says so of, in a grid as large as the whole.
+    pub fn keep(&self, keep: impl Fn(&Component) -> bool) -> BitGrid {
+        let kept: Vec<bool> = self.components.iter().map(keep).collect();
+        let mut grid = BitGrid::empty(self.shape);
+        for row in 0..self.runs.starts.len() - 1 {
+            self.write_row(row, |label| kept[label], &mut grid);
+        }
+        grid
+    }
+
+    /// Sets the points of a row whose component's number is among those `wanted`.
+    fn write_row(&self, row: usize, wanted: impl Fn(usize) -> bool, grid: &mut BitGrid) {
+        let words = &mut grid.words[row * grid.row..][..grid.row];
+        for run in self.runs.starts[row]..self.runs.starts[row + 1] {
+            if wanted(self.labels[run]) {
+                for (index, bits) in span_words(self.runs.spans[run]) {
+                    words[index] |= bits;
+                }
+            }
+        }
+    }
+}
+
+impl<'a> IntoIterator for &'a Components {
+    type Item = &'a Component;
+    type IntoIter = core::slice::Iter<'a, Component>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}

@@ -1,1 +1,108 @@
 //! What a grid has in common with boxes, balls and other grids.
+
+use super::{BitGrid, runs::span_words};
+use crate::{lattice::Region, math::sqrt_f64};
+
+impl BitGrid {
+    /// Whether some point of a region is set. Points outside the grid are not.
+    pub fn overlaps_region(&self, region: Region) -> bool {
+        let [x, y, z] = self.clipped(region);
+        rows(y, z).any(|[y, z]| self.any_set(x, y, z))
+    }
+
+    /// Whether all points of a region are set; so they are of an empty one. Points outside the grid are not set.
+    pub fn covers_region(&self, region: Region) -> bool {
+        if region.is_empty() {
+            return true;
+        }
+        let [x, y, z] = self.clipped(region);
+        let inside = [x, y, z].map(|[start, end]| end.saturating_sub(start)) == region.size();
+        inside && rows(y, z).all(|[y, z]| span_words(x).all(|(index, bits)| self.row(y, z)[index] & bits == bits))
+    }
+
+    /// How many points of a region are set. Points outside the grid are not.
+    pub fn count_in(&self, region: Region) -> usize {
+        let [x, y, z] = self.clipped(region);
+        rows(y, z)
+            .map(|[y, z]| {
+                let row = self.row(y, z);
+                span_words(x).map(|(index, bits)| (row[index] & bits).count_ones() as usize).sum::<usize>()
+            })
+            .sum()
+    }
+
+    /// Whether some point is set whose distance from `centre` is at most `radius`, both in points of the lattice.
+    ///
+    /// A radius that is negative or NaN and a centre that is not finite overlap nothing; an infinite radius reaches
+    /// everything. Distances are computed in `f64`: exactly where it holds their squares (as of halves below 2²⁴);
+    /// otherwise what lies on the sphere but for its rounding may count or not.
+    pub fn overlaps_ball(&self, centre: [f32; 3], radius: f32) -> bool {
+        if !centre.iter().all(|v| v.is_finite()) || radius.is_nan() || radius < 0.0 {
+            return false;
+        }
+        let (centre, radius) = (centre.map(f64::from), f64::from(radius));
+        let size = self.shape.size();
+        // Of an axis, the coordinates that are at most `distance` away from the centre.
+        let within = |axis: usize, distance: f64| {
+            let (low, high) = (centre[axis] - distance, centre[axis] + distance);
+            // Conversions saturate, and round towards zero.
+            let below = low as u32;
+            let first = if f64::from(below) < low { below.saturating_add(1) } else { below };
+            let behind = if high < 0.0 { 0 } else { (high as u32).saturating_add(1) };
+            [first, behind.min(size[axis])]
+        };
+        let square = |axis: usize, v: u32| (f64::from(v) - centre[axis]) * (f64::from(v) - centre[axis]);
+        rows(within(1, radius), within(2, radius)).any(|[y, z]| {
+            let rest = radius * radius - square(1, y) - square(2, z);
+            rest >= 0.0 && self.any_set(within(0, sqrt_f64(rest)), y, z)
+        })
+    }
+
+    /// Whether some point is set in both grids, where the point p of `other` lies at p + `offset`. The grids may differ
+    /// in size, and lie beside each other.
+    pub fn overlaps(&self, other: &Self, offset: [i32; 3]) -> bool {
+        let [nx, ny, nz] = self.shape.size().map(i64::from);
+        let [mx, my, mz] = other.shape.size().map(i64::from);
+        let [ox, oy, oz] = offset.map(i64::from);
+        let (min_x, max_x) = (ox.max(0), nx.min(mx + ox));
+        if min_x >= max_x {
+            return false;
+        }
+        let words = min_x / 64..=(max_x - 1) / 64;
+        (oz.max(0)..nz.min(mz + oz)).any(|z| {
+            (oy.max(0)..ny.min(my + oy)).any(|y| {
+                let own = self.row(y as u32, z as u32);
+                let others = other.row((y - oy) as u32, (z - oz) as u32);
+                words.clone().any(|index| own[index as usize] & bits_from(others, 64 * index - ox) != 0)
+            })
+        })
+    }
+
+    /// Whether a row has a bit in a span.
+    fn any_set(&self, span: [u32; 2], y: u32, z: u32) -> bool {
+        let row = self.row(y, z);
+        span_words(span).any(|(index, bits)| row[index] & bits != 0)
+    }
+
+    /// The part of a region that lies in the grid: of each axis, the first and the one behind the last.
+    fn clipped(&self, region: Region) -> [[u32; 2]; 3] {
+        let size = self.shape.size();
+        core::array::from_fn(|axis| {
+            let [min, max] = [region.min[axis], region.max[axis]].map(|v| v.max(0) as u32);
+            [min, max.min(size[axis])]
+        })
+    }
+}
+
+/// The rows of a box.
+fn rows(y: [u32; 2], z: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+    (z[0]..z[1]).flat_map(move |z| (y[0]..y[1]).map(move |y| [y, z]))
+}
+
+/// The 64 bits of a row from `start` on, zeros before and behind it.
+fn bits_from(row: &[u64], start: i64) -> u64 {
+    let (index, shift) = (start.div_euclid(64), start.rem_euclid(64));
+    let word = |index: i64| usize::try_from(index).ok().and_then(|index| row.get(index)).copied().unwrap_or(0);
+    // In two steps, since a shift by 64 is none.
+    word(index) >> shift | word(index + 1) << 1 << (63 - shift)
+}
