@@ -11,6 +11,7 @@ mod mesh;
 mod morphology;
 mod overlap;
 mod paste;
+mod pattern;
 mod runs;
 mod samples;
 mod shift;
@@ -21,10 +22,11 @@ use alloc::{vec, vec::Vec};
 use thiserror::Error;
 
 use crate::{
-    lattice::{Samples, Shape},
+    lattice::{Region, Samples, Shape},
     sample::Weight,
     simd::Backend,
 };
+pub use automaton::Rule;
 pub use components::{Component, Components};
 pub use connectivity::Connectivity;
 pub(crate) use samples::SignRows;
@@ -269,5 +271,17 @@ pub enum BitsError {
         position: [u32; 3],
         /// The grid's shape.
         shape: Shape,
+    },
+    /// No grid has the size of a region: it is empty, or has more points than can be counted.
+    #[error("no grid has the size of the region from {:?} to {:?}", .region.min, .region.max)]
+    RegionSize {
+        /// What was given.
+        region: Region,
+    },
+    /// A point has 26 neighbours at most.
+    #[error("a rule counts up to 26 neighbours, but {count} was given")]
+    NeighbourCount {
+        /// What was given.
+        count: u8,
     },
 }

@@ -69,7 +69,7 @@ fn spans(grid: &BitGrid, size: [u32; 3], min: [i64; 3]) -> Option<[(i64, i64); 3
 }
 
 /// The 64 bits of a row from the bit `first` on; zeros beyond its ends.
-fn word_at(row: &[u64], first: i64) -> u64 {
+pub(super) fn word_at(row: &[u64], first: i64) -> u64 {
     let (index, shift) = (first.div_euclid(64), first.rem_euclid(64) as u32);
     let word = |index: i64| usize::try_from(index).ok().and_then(|index| row.get(index)).copied().unwrap_or(0);
     // In two steps, since a shift by 64 is none.

@@ -1,1 +1,162 @@
 //! Shifting a whole grid.
+//!
+//! A shift along y and z moves whole rows. One along x moves words, and bits from each word into the next: it runs over
+//! the rows of a slab as over one stream of words, and a mask for each word of a row takes away what would come from
+//! another row.
+
+use super::{BitGrid, BitsError, pattern::Pattern};
+use crate::simd::{Backend, Job, Simd, dispatch};
+
+impl BitGrid {
+    /// The grid with every set point moved by `offset`: point `p` of it is point `p - offset` of this one. Zeros come in
+    /// at the borders; what leaves the grid is lost.
+    ///
+    /// ```
+    /// use marchless::{Shape, bits::BitGrid};
+    ///
+    /// let mut grid = BitGrid::new(Shape::cube(100)?)?;
+    /// grid.set([20, 1, 1], true)?;
+    /// assert!(grid.shifted([70, 0, -1]).iter().eq([[90, 1, 0]]));
+    /// assert!(grid.shifted([-21, 0, 0]).is_empty());
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn shifted(&self, offset: [i32; 3]) -> Self {
+        let mut out = self.zeros();
+        dispatch(Backend::fastest(), Shift { from: self, offset, out: &mut out });
+        out
+    }
+
+    /// [`shifted`](Self::shifted), into a grid that is there.
+    ///
+    /// # Errors
+    /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
+    pub fn shift_into(&self, offset: [i32; 3], out: &mut Self) -> Result<(), BitsError> {
+        self.same_shape(out)?;
+        dispatch(Backend::fastest(), Shift { from: self, offset, out });
+        Ok(())
+    }
+
+    /// A grid of zeros of the same shape.
+    pub(super) fn zeros(&self) -> Self {
+        Self { shape: self.shape, row: self.row, words: alloc::vec![0; self.words.len()] }
+    }
+}
+
+struct Shift<'a> {
+    from: &'a BitGrid,
+    offset: [i32; 3],
+    out: &'a mut BitGrid,
+}
+
+impl Job for Shift<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { from, offset: [dx, dy, dz], out } = self;
+        let size = from.shape.size();
+        if (0..3).any(|axis| self.offset[axis].unsigned_abs() >= size[axis]) {
+            out.words.fill(0);
+            return;
+        }
+        let [_, ny, nz] = size.map(|size| size as usize);
+        let slab = from.row * ny;
+        let along_x = AlongX::new(from, dx);
+        let (source, target) = overlap(&from.words, &mut out.words, dz, slab);
+        if dy == 0 {
+            along_x.run(source, target);
+            return;
+        }
+        debug_assert_eq!(source.len() % slab, 0);
+        debug_assert!(source.len() / slab <= nz);
+        for (source, target) in source.chunks_exact(slab).zip(target.chunks_exact_mut(slab)) {
+            let (source, target) = overlap(source, target, dy, from.row);
+            along_x.run(source, target);
+        }
+    }
+}
+
+/// What is left of both when `steps` pieces of `piece` words move from `source` to `target`. The rest of the target
+/// becomes zero.
+#[inline(always)]
+fn overlap<'a>(source: &'a [u64], target: &'a mut [u64], steps: i32, piece: usize) -> (&'a [u64], &'a mut [u64]) {
+    let (words, rest) = (steps.unsigned_abs() as usize * piece, target.len() - steps.unsigned_abs() as usize * piece);
+    if steps < 0 {
+        let (target, zeros) = target.split_at_mut(rest);
+        zeros.fill(0);
+        (&source[words..], target)
+    } else {
+        let (zeros, target) = target.split_at_mut(words);
+        zeros.fill(0);
+        (&source[..rest], target)
+    }
+}
+
+/// A shift along x by less than a row.
+struct AlongX {
+    up: bool,
+    /// By how many words, and by how many bits more.
+    words: usize,
+    bits: u32,
+    /// What the words of a row may get, the first being that of [`AlongX::run`]'s loop.
+    masks: Pattern,
+}
+
+impl AlongX {
+    #[inline(always)]
+    fn new(grid: &BitGrid, offset: i32) -> Self {
+        let (row, last) = (grid.row, grid.last_word());
+        let (words, bits) = ((offset.unsigned_abs() / 64) as usize, offset.unsigned_abs() % 64);
+        let up = offset > 0;
+        let rows = grid.words.len() / row;
+        let start = if up { (words + 1) % row } else { 0 };
+        let masks = Pattern::new(row, if offset == 0 { 1 } else { rows }, start, |column| {
+            let word = if up { Some(column) } else { (row - 1).checked_sub(column) };
+            let mask = match word.and_then(|word| word.checked_sub(words)) {
+                None => 0,
+                Some(0) if up => u64::MAX << bits,
+                Some(0) => u64::MAX >> bits,
+                Some(_) => u64::MAX,
+            };
+            if column == row - 1 { mask & last } else { mask }
+        });
+        Self { up, words, bits, masks }
+    }
+
+    /// Shifts whole rows.
+    #[inline(always)]
+    fn run(&self, source: &[u64], target: &mut [u64]) {
+        let (words, bits, len) = (self.words, self.bits, source.len());
+        if words == 0 && bits == 0 {
+            target.copy_from_slice(source);
+        } else if self.up {
+            target[..words].fill(0);
+            let mask = self.masks.words().last().copied().unwrap_or(0);
+            target[words] = source[0] << bits & mask;
+            let (moved, carried) = (&source[1..len - words], &source[..len - words - 1]);
+            self.stream(moved, carried, &mut target[words + 1..], |moved, carried| {
+                moved << bits | carried >> 1 >> (63 - bits)
+            });
+        } else {
+            let rest = len - words - 1;
+            target[rest + 1..].fill(0);
+            target[rest] = source[len - 1] >> bits;
+            self.stream(&source[words..len - 1], &source[words + 1..], &mut target[..rest], |moved, carried| {
+                moved >> bits | carried << 1 << (63 - bits)
+            });
+        }
+    }
+
+    /// Writes what `join` makes of the words of both slices, masked.
+    #[inline(always)]
+    fn stream(&self, moved: &[u64], carried: &[u64], target: &mut [u64], join: impl Fn(u64, u64) -> u64) {
+        let masks = self.masks.words();
+        let pieces = moved.chunks(masks.len()).zip(carried.chunks(masks.len()));
+        for (target, (moved, carried)) in target.chunks_mut(masks.len()).zip(pieces) {
+            for (((target, &moved), &carried), &mask) in target.iter_mut().zip(moved).zip(carried).zip(masks) {
+                *target = join(moved, carried) & mask;
+            }
+        }
+    }
+}
