@@ -5,6 +5,7 @@
 mod masks;
 mod ops;
 mod regions;
+mod word_stride;
 
 use criterion::{criterion_group, criterion_main};
 
