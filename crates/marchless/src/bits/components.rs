@@ -9,8 +9,12 @@ use alloc::vec::Vec;
 use super::{
     BitGrid, Connectivity,
     runs::{Runs, span_words},
+    set_bits,
 };
-use crate::lattice::{Region, Shape};
+use crate::{
+    lattice::{Region, Shape},
+    simd::{Backend, Job, Simd, dispatch},
+};
 
 /// The connected components of a grid's set points, numbered by their first points in the order of memory.
 ///
@@ -50,60 +54,86 @@ impl BitGrid {
     /// The connected components of the set points.
     pub fn components(&self, connectivity: Connectivity) -> Components {
         let runs = Runs::of(self);
-        let mut parents: Vec<usize> = (0..runs.spans.len()).collect();
-        let [_, ny, nz] = self.shape.size().map(|size| size as usize);
-        let faces = u32::from(connectivity != Connectivity::Six);
-        let edges = u32::from(connectivity == Connectivity::TwentySix);
-        for z in 0..nz {
-            for y in 0..ny {
-                let row = y + ny * z;
-                let mut join = |other, reach| join_rows(&runs, [row, other], reach, &mut parents);
-                if y > 0 {
-                    join(row - 1, faces);
-                }
-                if z > 0 {
-                    join(row - ny, faces);
-                    if connectivity != Connectivity::Six {
-                        if y > 0 {
-                            join(row - ny - 1, edges);
-                        }
-                        if y + 1 < ny {
-                            join(row - ny + 1, edges);
-                        }
-                    }
-                }
-            }
-        }
+        let parents = dispatch(Backend::fastest(), Join { grid: self, runs: &runs, connectivity });
         number(self.shape, runs, parents)
     }
 }
 
-/// Joins the runs of two rows that overlap, or that would if one of them were `reach` longer at both ends.
-fn join_rows(runs: &Runs, rows: [usize; 2], reach: u32, parents: &mut [usize]) {
-    let [mut a, mut b] = rows.map(|row| runs.starts[row]);
-    let ends = rows.map(|row| runs.starts[row + 1]);
-    while a < ends[0] && b < ends[1] {
-        let ([start_a, end_a], [start_b, end_b]) = (runs.spans[a], runs.spans[b]);
-        // An end is at most `u32::MAX`, and a start below one.
-        if start_a < end_b.saturating_add(reach) && start_b < end_a.saturating_add(reach) {
-            union(parents, a, b);
+/// Joins all runs that touch. Gives each a parent in its component: the first run itself, or one before it.
+struct Join<'a> {
+    grid: &'a BitGrid,
+    runs: &'a Runs,
+    connectivity: Connectivity,
+}
+
+impl Job for Join<'_> {
+    type Output = Vec<usize>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Vec<usize> {
+        let mut parents: Vec<usize> = (0..self.runs.spans.len()).collect();
+        let [_, ny, nz] = self.grid.shape.size().map(|size| size as usize);
+        let six = self.connectivity == Connectivity::Six;
+        let all = self.connectivity == Connectivity::TwentySix;
+        for z in 0..nz {
+            for y in 0..ny {
+                let row = y + ny * z;
+                if y > 0 {
+                    self.join(row, row - 1, !six, &mut parents);
+                }
+                if z > 0 {
+                    self.join(row, row - ny, !six, &mut parents);
+                    if !six && y > 0 {
+                        self.join(row, row - ny - 1, all, &mut parents);
+                    }
+                    if !six && y + 1 < ny {
+                        self.join(row, row - ny + 1, all, &mut parents);
+                    }
+                }
+            }
         }
-        // Between a run and the next is a point, so that the one that ends first touches nothing more.
-        if end_a < end_b {
-            a += 1;
-        } else {
-            b += 1;
+        parents
+    }
+}
+
+impl Join<'_> {
+    /// Joins the runs of two rows that overlap, and where the neighbourhood is `wide` those that follow one another.
+    #[inline(always)]
+    fn join(&self, row_a: usize, row_b: usize, wide: bool, parents: &mut [usize]) {
+        let len = self.grid.row;
+        let words_a = &self.grid.words[row_a * len..][..len];
+        let words_b = &self.grid.words[row_b * len..][..len];
+        // How many runs started in the words before, and whether the last bit there is set.
+        let (mut run_a, mut run_b) = (self.runs.starts[row_a], self.runs.starts[row_b]);
+        let (mut last_a, mut last_b) = (0, 0);
+        let wide = if wide { u64::MAX } else { 0 };
+        for (&a, &b) in words_a.iter().zip(words_b) {
+            let (behind_a, behind_b) = (a << 1 | last_a, b << 1 | last_b);
+            let (starts_a, starts_b) = (a & !behind_a, b & !behind_b);
+            // Two runs touch first where one starts, and the other has a bit there or just before.
+            let touching = starts_a & (b | behind_b & wide) | starts_b & (a | behind_a & wide);
+            for bit in set_bits(touching) {
+                let until = u64::MAX >> (63 - bit);
+                let a = run_a + (starts_a & until).count_ones() as usize - 1;
+                let b = run_b + (starts_b & until).count_ones() as usize - 1;
+                union(parents, a, b);
+            }
+            run_a += starts_a.count_ones() as usize;
+            run_b += starts_b.count_ones() as usize;
+            (last_a, last_b) = (a >> 63, b >> 63);
         }
     }
 }
 
 /// Makes one set of those that two runs are in. A parent is never behind its child.
+#[inline(always)]
 fn union(parents: &mut [usize], a: usize, b: usize) {
     let (a, b) = (root(parents, a), root(parents, b));
     parents[a.max(b)] = a.min(b);
 }
 
 /// The first run of a set, as far as it is known; halves the way to it.
+#[inline(always)]
 fn root(parents: &mut [usize], mut run: usize) -> usize {
     while parents[run] != run {
         parents[run] = parents[parents[run]];
