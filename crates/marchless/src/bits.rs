@@ -29,6 +29,8 @@ use crate::{
 pub use automaton::Rule;
 pub use components::{Component, Components};
 pub use connectivity::Connectivity;
+pub use materials::MaterialGrid;
+pub use mesh::BitMesher;
 pub(crate) use samples::SignRows;
 pub use tile::{Tile, TileGrid};
 
@@ -283,5 +285,31 @@ pub enum BitsError {
     NeighbourCount {
         /// What was given.
         count: u8,
+    },
+    /// Materials take 2 to 8 planes.
+    #[error("materials take 2 to 8 planes, but {found} were asked for")]
+    PlanesOutOfRange {
+        /// What was asked for.
+        found: u32,
+    },
+    /// The materials do not fill the grid.
+    #[error("a grid of {shape} needs {expected} materials, but there are {found}")]
+    MaterialsLength {
+        /// The grid's shape.
+        shape: Shape,
+        /// The number of its points.
+        expected: usize,
+        /// The slice's length.
+        found: usize,
+    },
+    /// A material's number has more bits than there are planes.
+    #[error("{planes} planes hold materials below {}, but {material} was given for {position:?}", 1u32 << planes)]
+    MaterialTooLarge {
+        /// What was given.
+        material: u8,
+        /// For which point.
+        position: [u32; 3],
+        /// Bits per point.
+        planes: u32,
     },
 }

@@ -44,7 +44,7 @@ use slabs::{Input, Lattice, Slabs};
 pub use stream::SlabMesher;
 #[cfg(feature = "std")]
 pub use threads::ThreadedMesher;
-pub(crate) use vertices::crossing_fraction;
+pub(crate) use vertices::{clamped, crossing_fraction};
 
 /// How to mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]

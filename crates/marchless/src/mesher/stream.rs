@@ -72,9 +72,18 @@ impl<W: Weight> SlabMesher<W> {
             let (size, expected) = (self.size, self.lattice.len);
             return Err(MeshError::SlabLength { size, expected, found: slab.len() });
         }
+        let fill = |newest: &mut Vec<W>| {
+            newest.clear();
+            newest.extend_from_slice(slab);
+        };
+        self.push_with(fill, out)
+    }
+
+    /// The same of the slab that `fill` makes of an older one, or of an empty vector.
+    pub(crate) fn push_with(&mut self, fill: impl FnOnce(&mut Vec<W>), out: &mut MeshBuffer) -> Result<(), MeshError> {
         let newest = &mut self.newest[self.count % 4];
-        newest.clear();
-        newest.extend_from_slice(slab);
+        fill(newest);
+        debug_assert_eq!(newest.len(), self.lattice.len);
         self.count += 1;
         // Gradients need the slab above.
         if self.count >= 2 { self.step(self.count - 2, out) } else { Ok(()) }
@@ -85,10 +94,25 @@ impl<W: Weight> SlabMesher<W> {
     /// # Errors
     /// [`MeshError::TooFewSlabs`] where fewer than 2 slabs have come; [`MeshError::TooManyVertices`].
     pub fn finish(mut self, out: &mut MeshBuffer) -> Result<(), MeshError> {
+        self.end(out)
+    }
+
+    /// The same for a mesher that will [start over](Self::start_over).
+    pub(crate) fn end(&mut self, out: &mut MeshBuffer) -> Result<(), MeshError> {
         if self.count < 2 {
             return Err(MeshError::TooFewSlabs { found: self.count });
         }
         self.step(self.count - 1, out)
+    }
+
+    /// Begins another volume, and keeps the memory.
+    ///
+    /// # Errors
+    /// As [`SlabMesher::new`].
+    pub(crate) fn start_over(&mut self, size: [u32; 2]) -> Result<(), MeshError> {
+        self.lattice = Lattice::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
+        (self.size, self.count) = (size, 0);
+        Ok(())
     }
 
     fn step(&mut self, z: usize, out: &mut MeshBuffer) -> Result<(), MeshError> {

@@ -406,7 +406,7 @@ pub(crate) fn crossing_fraction<W: Weight>(a: W, b: W, isovalue: f32) -> f32 {
 
 /// A NaN (both ends at the same limit of `f32`) fails the first comparison.
 #[inline(always)]
-fn clamped(fraction: f32) -> f32 {
+pub(crate) fn clamped(fraction: f32) -> f32 {
     let fraction = if fraction > MARGIN { fraction } else { MARGIN };
     if fraction < 1.0 - MARGIN { fraction } else { 1.0 - MARGIN }
 }

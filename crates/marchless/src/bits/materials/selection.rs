@@ -1,0 +1,101 @@
+//! Which points have one of a set of materials: a decision diagram over the planes, evaluated a block of words at a time.
+
+use alloc::{vec, vec::Vec};
+
+use crate::{
+    bits::BitGrid,
+    simd::{Job, Simd},
+};
+
+/// Some of the 256 materials, a bit each.
+#[derive(Default)]
+pub(super) struct MaterialSet([u128; 2]);
+
+impl FromIterator<u8> for MaterialSet {
+    fn from_iter<I: IntoIterator<Item = u8>>(materials: I) -> Self {
+        let mut set = Self::default();
+        for material in materials {
+            set.0[usize::from(material / 128)] |= 1 << (material % 128);
+        }
+        set
+    }
+}
+
+impl MaterialSet {
+    const fn contains(&self, material: usize) -> bool {
+        self.0[material / 128] >> (material % 128) & 1 == 1
+    }
+}
+
+/// Words that are made at once; all nodes of them stay in the cache.
+const BLOCK: usize = 32;
+/// The slot of what is always zero, and that of what is always one.
+const ZEROS: usize = 0;
+const ONES: usize = 1;
+
+/// A choice between the words of two slots by those of a plane.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Node {
+    plane: usize,
+    where_zero: usize,
+    where_one: usize,
+}
+
+/// The words of a set of materials, to be made.
+pub(super) struct Selection<'a> {
+    /// Slot `2 + k` is what node `k` gives; it refers to slots before it. No two nodes are equal.
+    nodes: Vec<Node>,
+    result: usize,
+    planes: &'a [BitGrid],
+    out: &'a mut [u64],
+}
+
+impl<'a> Selection<'a> {
+    /// `out`: as many words as each plane has. What it leaves in the unused bits of rows means nothing.
+    pub(super) fn new(set: &MaterialSet, planes: &'a [BitGrid], out: &'a mut [u64]) -> Self {
+        let mut nodes = Vec::new();
+        let result = slot_of(set, 0, planes.len(), &mut nodes);
+        Self { nodes, result, planes, out }
+    }
+}
+
+/// The slot of those among the `2^planes` materials from `first` on that are in the set, as the lowest `planes` planes
+/// tell them apart.
+fn slot_of(set: &MaterialSet, first: usize, planes: usize, nodes: &mut Vec<Node>) -> usize {
+    let Some(plane) = planes.checked_sub(1) else {
+        return if set.contains(first) { ONES } else { ZEROS };
+    };
+    let where_zero = slot_of(set, first, plane, nodes);
+    let where_one = slot_of(set, first + (1 << plane), plane, nodes);
+    if where_zero == where_one {
+        return where_zero;
+    }
+    let node = Node { plane, where_zero, where_one };
+    let number = nodes.iter().position(|&other| other == node).unwrap_or_else(|| {
+        nodes.push(node);
+        nodes.len() - 1
+    });
+    2 + number
+}
+
+impl Job for Selection<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { nodes, result, planes, out } = self;
+        let mut slots = vec![[0; BLOCK]; 2 + nodes.len()];
+        slots[ONES] = [u64::MAX; BLOCK];
+        for (number, out) in out.chunks_mut(BLOCK).enumerate() {
+            for (index, node) in nodes.iter().enumerate() {
+                let words = &planes[node.plane].words[BLOCK * number..][..out.len()];
+                let (before, from) = slots.split_at_mut(2 + index);
+                let (zero, one) = (&before[node.where_zero], &before[node.where_one]);
+                for (((made, word), zero), one) in from[0].iter_mut().zip(words).zip(zero).zip(one) {
+                    *made = zero ^ word & (zero ^ one);
+                }
+            }
+            out.copy_from_slice(&slots[result][..out.len()]);
+        }
+    }
+}
