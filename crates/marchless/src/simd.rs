@@ -146,13 +146,13 @@ pub trait Simd {
     /// At each step, blocks on one side of the diagonal change places with those on the other.
     #[inline(always)]
     fn case_bytes(corners: [u64; 8]) -> [u8; 64] {
-        let mut words = corners;
-        for (apart, low) in [(4, 0x0F0F_0F0F_0F0F_0F0F), (2, 0x3333_3333_3333_3333), (1, 0x5555_5555_5555_5555)] {
-            swap_blocks(&mut words, apart, apart, low);
-        }
-        for (apart, low) in [(4, 0x0000_0000_FFFF_FFFF), (2, 0x0000_FFFF_0000_FFFF), (1, 0x00FF_00FF_00FF_00FF)] {
-            swap_blocks(&mut words, apart, 8 * apart, low);
-        }
+        // Written out, so that everything stays in registers.
+        let words = swap_blocks::<4, 4>(corners, 0x0F0F_0F0F_0F0F_0F0F);
+        let words = swap_blocks::<2, 2>(words, 0x3333_3333_3333_3333);
+        let words = swap_blocks::<1, 1>(words, 0x5555_5555_5555_5555);
+        let words = swap_blocks::<4, 32>(words, 0x0000_0000_FFFF_FFFF);
+        let words = swap_blocks::<2, 16>(words, 0x0000_FFFF_0000_FFFF);
+        let words = swap_blocks::<1, 8>(words, 0x00FF_00FF_00FF_00FF);
         let mut bytes = [0; 64];
         for (bytes, word) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(words) {
             *bytes = word.to_le_bytes();
@@ -190,15 +190,15 @@ pub trait Simd {
     ) -> usize;
 }
 
-/// Exchanges the high part of each word with the low part of the word `apart` behind it: what `low` selects there, and
-/// `shift` further up here.
+/// Exchanges the high part of each word with the low part of the word `APART` behind it: what `low` selects there, and
+/// `SHIFT` further up here.
 #[inline(always)]
-fn swap_blocks(words: &mut [u64; 8], apart: usize, shift: usize, low: u64) {
-    for index in (0..8).filter(|index| index & apart == 0) {
-        let change = (words[index] >> shift ^ words[index + apart]) & low;
-        words[index] ^= change << shift;
-        words[index + apart] ^= change;
-    }
+fn swap_blocks<const APART: usize, const SHIFT: u32>(words: [u64; 8], low: u64) -> [u64; 8] {
+    core::array::from_fn(|index| {
+        let (first, second) = (words[index & !APART], words[index | APART]);
+        let change = (first >> SHIFT ^ second) & low;
+        if index & APART == 0 { first ^ change << SHIFT } else { second ^ change }
+    })
 }
 
 /// The first, second, third and fourth corner of each face, around it. In the places of a seventh and eighth face, the

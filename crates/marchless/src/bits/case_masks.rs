@@ -103,15 +103,19 @@ impl Job for CaseMasks<'_> {
 /// overwritten.
 #[inline(always)]
 fn row_masks<S: Simd>(rows: [&[u64]; 4], cells: usize, masks: &mut [u8]) {
-    for word in 0..cells.div_ceil(64) {
+    let bytes = |word: usize| {
         let low = rows.map(|row| row[word]);
         let next = rows.map(|row| row.get(word + 1).copied().unwrap_or(0));
-        let bytes = S::case_bytes(corners(low, next));
-        let masks = &mut masks[64 * word..];
-        match masks.first_chunk_mut::<64>() {
-            Some(block) => *block = bytes,
-            None => masks.copy_from_slice(&bytes[..masks.len()]),
-        }
+        S::case_bytes(corners(low, next))
+    };
+    let words = cells.div_ceil(64);
+    let (blocks, rest) = masks.as_chunks_mut::<64>();
+    for (word, block) in blocks.iter_mut().take(words).enumerate() {
+        *block = bytes(word);
+    }
+    // The last rows of all.
+    if blocks.len() < words {
+        rest.copy_from_slice(&bytes(words - 1)[..rest.len()]);
     }
 }
 

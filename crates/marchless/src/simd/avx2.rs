@@ -59,6 +59,13 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn case_bytes(corners: [u64; 8]) -> [u8; 64] {
+        let [a, b, c, d, e, f, g, h] = corners;
+        // SAFETY: within `run`.
+        unsafe { self::case_bytes(a, b, c, d, e, f, g, h) }
+    }
+
+    #[inline(always)]
     fn triangles(
         recipes: &[Recipe; CODES],
         codes: &[u16],
@@ -149,6 +156,38 @@ fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
         active &= active - 1;
     }
     count
+}
+
+/// As the plain version, but byte by byte first, so that each word then holds the corners of eight cells.
+///
+/// Eight arguments, since of an array the compiler makes vector loads before it sees that the array is still in registers.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn case_bytes(a: u64, b: u64, c: u64, d: u64, e: u64, f: u64, g: u64, h: u64) -> [u8; 64] {
+    let even = _mm256_setr_epi64x(a as i64, c as i64, e as i64, g as i64);
+    let odd = _mm256_setr_epi64x(b as i64, d as i64, f as i64, h as i64);
+    // The bytes of two corners side by side, then those of four, then those of eight.
+    let (low, high) = (_mm256_unpacklo_epi8(even, odd), _mm256_unpackhi_epi8(even, odd));
+    let join = |fours| _mm256_shuffle_epi32::<0b11_01_10_00>(_mm256_permute4x64_epi64::<0b11_01_10_00>(fours));
+    let halves = [join(_mm256_unpacklo_epi16(low, high)), join(_mm256_unpackhi_epi16(low, high))];
+    let mut dense = [0; 64];
+    for (half, dense) in halves.into_iter().zip(dense.as_chunks_mut::<32>().0) {
+        let mut words = half;
+        // Blocks of one, two and four bits change places across the diagonal.
+        macro_rules! swap_blocks {
+            ($shift:literal, $low:literal) => {
+                let there = _mm256_srli_epi64::<$shift>(words);
+                let change = _mm256_and_si256(_mm256_xor_si256(words, there), _mm256_set1_epi64x($low));
+                words = _mm256_xor_si256(words, _mm256_xor_si256(change, _mm256_slli_epi64::<$shift>(change)));
+            };
+        }
+        swap_blocks!(7, 0x00AA_00AA_00AA_00AA);
+        swap_blocks!(14, 0x0000_CCCC_0000_CCCC);
+        swap_blocks!(28, 0x0000_0000_F0F0_F0F0);
+        // SAFETY: the store is all of the 32 bytes.
+        unsafe { _mm256_storeu_si256(dense.as_mut_ptr().cast(), words) }
+    }
+    dense
 }
 
 #[inline]
