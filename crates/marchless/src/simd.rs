@@ -122,6 +122,9 @@ pub(crate) fn dispatch<J: Job>(backend: Backend, job: J) -> J::Output {
 
 /// What the backends do each in their way. [`portable`] is the plain version that the tests hold the others to.
 pub trait Simd {
+    /// Eight words in registers.
+    type Eight: Eight;
+
     /// One bit a weight, set where it is below `threshold`.
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32;
     /// One bit a weight, set where it is below `threshold`.
@@ -199,6 +202,24 @@ fn swap_blocks<const APART: usize, const SHIFT: u32>(words: [u64; 8], low: u64) 
         let change = (first >> SHIFT ^ second) & low;
         if index & APART == 0 { first ^ change << SHIFT } else { second ^ change }
     })
+}
+
+/// Eight words that are treated at once, in lanes 0–7. For loops that keep them from one step to the next: those are not
+/// vectorised by the compiler.
+pub trait Eight: Copy {
+    fn load(words: &[u64; 8]) -> Self;
+    fn store(self, words: &mut [u64; 8]);
+
+    /// The bits of both where `AND`, those of either where not.
+    fn join<const AND: bool>(self, other: Self) -> Self;
+
+    /// The lanes `START` to `START + 7` of two times eight. `START`: 1, 2, 4, 6 or 7.
+    fn window<const START: usize>(first: Self, second: Self) -> Self;
+
+    /// Joins each bit with those beside it in `sides`, at one less of its number where `from_low` is set, and at one more
+    /// where `from_high` is; words are one row, the lowest bits of lane 0 first. What the lowest bit of lane 0 and the
+    /// highest of lane 7 are joined with means nothing.
+    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self;
 }
 
 /// The first, second, third and fourth corner of each face, around it. In the places of a seventh and eighth face, the

@@ -8,8 +8,8 @@ use marchless::{
 };
 use proptest::{prelude::*, sample::select};
 
-/// Sizes around those of words, and one with more words a row than a loop takes at once.
-const SIZES: [u32; 11] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 645];
+/// Sizes around those of words, four words, and rows that are treated in one, two and three parts.
+const SIZES: [u32; 14] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 320, 645, 1000];
 
 /// A grid that says how it was made, not what it holds.
 #[derive(Clone, Copy)]
@@ -248,6 +248,24 @@ proptest! {
         grid.step_into(&rule, &mut out).unwrap();
         same(&out, &expected)?;
     }
+}
+
+/// Rows longer than those masks of words that are kept for several rows.
+#[test]
+fn long_rows_are_shifted_and_counted() {
+    let case = Case { size: [16_500, 2, 2], seed: 5, density: 3 };
+    let grid = case.grid();
+    for offset in [[1, 0, 0], [-1, 1, 0], [70, 0, -1], [-16_400, 0, 0], [16_499, 1, 1], [0, -1, 0]] {
+        let expected = made(case.shape(), |p| bit(&grid, p, offset.map(|v: i32| -v), false));
+        same(&grid.shifted(offset), &expected).unwrap();
+    }
+    let counts = [1, 4, 5, 7];
+    let around = neighbours(Connectivity::TwentySix);
+    let expected = made(case.shape(), |p| {
+        let count = around.iter().filter(|&&by| bit(&grid, p, by, true)).count();
+        !grid.get(p) && counts.contains(&(count as u8))
+    });
+    same(&grid.stepped(&Rule::new(&counts, &[]).unwrap().with_outside(true)), &expected).unwrap();
 }
 
 /// Every count of neighbours, of a point that is set and of one that is not, with rules of one count and with ranges.

@@ -1,13 +1,12 @@
 //! Dilation, erosion, opening, closing.
 //!
-//! Slab by slab: first along z, where whole slabs are joined, then along y, where whole rows are, and along x last. The
-//! box of 26 neighbours is all three in turn; those of 18 and of 6 take what is joined less from the sides. A slab or a
-//! row beyond the border adds nothing, and is replaced by the one beside it.
+//! Slab by slab, each from the lowest y to the highest, a row or a few short ones at once: what is joined along z stays
+//! in registers for two steps, until it has been joined along y, and at once along x.
 
-use alloc::{vec, vec::Vec};
+use core::array::from_fn;
 
 use super::{BitGrid, BitsError, Connectivity, pattern::Pattern};
-use crate::simd::{Backend, Job, Simd, dispatch};
+use crate::simd::{Backend, Eight, Job, Simd, dispatch};
 
 impl BitGrid {
     /// The points that are set or have a neighbour that is. Points outside are not set.
@@ -82,82 +81,191 @@ impl<const ERODE: bool> Job for Spread<'_, ERODE> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self) {
-        let Self { from, connectivity, out } = self;
-        let row = from.row;
-        let slab = row * from.shape.size()[1] as usize;
-        let ends = Ends::new(from);
-        let mut along_z = vec![0; slab];
-        // With one more word on either side.
-        let [mut across, mut square]: [Vec<u64>; 2] = [(); 2].map(|()| vec![0; slab + 2]);
+    fn run<S: Simd>(mut self) {
+        match self.from.row {
+            1 => self.strip::<S, 1>(0),
+            2 => self.strip::<S, 2>(0),
+            4 => self.strip::<S, 4>(0),
+            row => {
+                // The first and the last word of a strip look at words that it has not, but at the ends of rows.
+                let mut start = 0;
+                loop {
+                    self.strip::<S, LANES>(start);
+                    if start + LANES >= row {
+                        break;
+                    }
+                    start = (start + LANES - 2).min(row - LANES);
+                }
+            }
+        }
+    }
+}
+
+impl<const ERODE: bool> Spread<'_, ERODE> {
+    #[inline(always)]
+    fn strip<S: Simd, const ROW: usize>(&mut self, start: usize) {
+        let strip = Strip::new(self.from, start, ROW);
+        match self.connectivity {
+            Connectivity::Six => strip.slabs::<S, ROW, ERODE, 6>(self.from, self.out),
+            Connectivity::Eighteen => strip.slabs::<S, ROW, ERODE, 18>(self.from, self.out),
+            Connectivity::TwentySix => strip.slabs::<S, ROW, ERODE, 26>(self.from, self.out),
+        }
+    }
+}
+
+/// Words that are treated at once.
+const LANES: usize = 8;
+
+/// A part of a slab that is treated from the lowest y to the highest: eight words of every row, or all of rows that are
+/// shorter, several at once where they fit.
+struct Strip {
+    /// Its first word in a row.
+    start: usize,
+    /// From words treated together to the next.
+    step: usize,
+    /// Which points have a neighbour at −x and at +x, for each word.
+    from_low: [u64; LANES],
+    from_high: [u64; LANES],
+}
+
+impl Strip {
+    #[inline(always)]
+    fn new(grid: &BitGrid, start: usize, lanes_a_row: usize) -> Self {
+        let (row, last) = (grid.row, grid.last_word());
+        let column = |lane: usize| start + lane % lanes_a_row;
+        let valid = |column: usize| if column == row - 1 { last } else { u64::MAX };
+        Self {
+            start,
+            step: if lanes_a_row == LANES { row } else { LANES / lanes_a_row * lanes_a_row },
+            from_low: from_fn(|lane| valid(column(lane)) & if column(lane) == 0 { !1 } else { u64::MAX }),
+            from_high: from_fn(|lane| if column(lane) == row - 1 { last >> 1 } else { u64::MAX }),
+        }
+    }
+
+    /// Joins the points of all slabs with their neighbours.
+    #[inline(always)]
+    fn slabs<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
+        &self,
+        from: &BitGrid,
+        out: &mut BitGrid,
+    ) {
+        let slab = from.row * from.shape.size()[1] as usize;
         let slabs = from.words.chunks_exact(slab);
         let below = slabs.clone().take(1).chain(slabs.clone());
         let above = slabs.clone().skip(1).chain(slabs.clone().next_back());
         for (((out, here), below), above) in out.words.chunks_exact_mut(slab).zip(slabs).zip(below).zip(above) {
-            for (((joined, &here), &below), &above) in along_z.iter_mut().zip(here).zip(below).zip(above) {
-                *joined = join::<ERODE>(join::<ERODE>(here, below), above);
+            self.slab::<S, ROW, ERODE, NEIGHBOURS>([below, here, above], out);
+        }
+    }
+
+    /// Joins the points of a slab with their neighbours in it and in those below and above. `ROW`: how many words a row
+    /// has, or [`LANES`] where one row at once is treated.
+    #[inline(always)]
+    fn slab<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
+        &self,
+        slabs: [&[u64]; 3],
+        out: &mut [u64],
+    ) {
+        let masks = [S::Eight::load(&self.from_low), S::Eight::load(&self.from_high)];
+        let nothing = S::Eight::load(&[nothing::<ERODE>(); LANES]);
+        let (mut before, mut here) = ([nothing; 2], load_part::<S, ERODE>(slabs, self.start));
+        let mut at = self.start;
+        // What is written behind the words of a step is overwritten by the next.
+        if at == 0 {
+            // Where all that a step reads is there; it has no branches.
+            while let ([Some(below), Some(now), Some(above)], Some(out)) =
+                (slabs.map(|slab| chunk(slab, at + self.step)), out.get_mut(at..).and_then(|out| out.first_chunk_mut()))
+            {
+                let behind = join_slabs::<S, ERODE>([below, now, above]);
+                step::<S, ROW, ERODE, NEIGHBOURS>([before, here, behind], masks).store(out);
+                (before, here) = (here, behind);
+                at += self.step;
             }
-            match connectivity {
-                Connectivity::Six => {
-                    along_y::<ERODE>(&along_z, here, row, &mut square[1..=slab]);
-                    across[1..=slab].copy_from_slice(here);
-                    along_x::<ERODE>(&square[1..=slab], &across, &ends, out);
-                }
-                Connectivity::Eighteen => {
-                    along_y::<ERODE>(&along_z, here, row, &mut across[1..=slab]);
-                    along_y::<ERODE>(&along_z, &along_z, row, &mut square[1..=slab]);
-                    along_x::<ERODE>(&square[1..=slab], &across, &ends, out);
-                }
-                Connectivity::TwentySix => {
-                    along_y::<ERODE>(&along_z, &along_z, row, &mut square[1..=slab]);
-                    along_x::<ERODE>(&square[1..=slab], &square, &ends, out);
+        }
+        while at < out.len() {
+            let behind = load_part::<S, ERODE>(slabs, at + self.step);
+            let joined = step::<S, ROW, ERODE, NEIGHBOURS>([before, here, behind], masks);
+            match out[at..].first_chunk_mut() {
+                Some(out) if self.start == 0 => joined.store(out),
+                _ => {
+                    let mut words = [0; LANES];
+                    joined.store(&mut words);
+                    let first = usize::from(self.start > 0);
+                    out[at..].iter_mut().zip(words).skip(first).for_each(|(out, word)| *out = word);
                 }
             }
+            (before, here) = (here, behind);
+            at += self.step;
         }
     }
 }
 
-/// Union, or intersection.
-#[inline(always)]
-fn join<const ERODE: bool>(a: u64, b: u64) -> u64 {
-    if ERODE { a & b } else { a | b }
+/// What changes nothing when it is joined with something.
+const fn nothing<const ERODE: bool>() -> u64 {
+    if ERODE { u64::MAX } else { 0 }
 }
 
-/// Joins the rows of `centre` with the rows beside them in `sides`, rows of `row` words.
 #[inline(always)]
-fn along_y<const ERODE: bool>(centre: &[u64], sides: &[u64], row: usize, out: &mut [u64]) {
-    let rest = centre.len() - row;
-    if rest == 0 {
-        out.copy_from_slice(centre);
-        return;
+fn chunk(slab: &[u64], at: usize) -> Option<&[u64; LANES]> {
+    slab.get(at..)?.first_chunk()
+}
+
+/// The words of a slab, and those of it, the slab below and the slab above joined.
+#[inline(always)]
+fn join_slabs<S: Simd, const ERODE: bool>([below, here, above]: [&[u64; LANES]; 3]) -> [S::Eight; 2] {
+    let [below, here, above] = [S::Eight::load(below), S::Eight::load(here), S::Eight::load(above)];
+    [here, here.join::<ERODE>(below).join::<ERODE>(above)]
+}
+
+/// [`join_slabs`] of as many words as there are from `at` on.
+#[inline(always)]
+fn load_part<S: Simd, const ERODE: bool>(slabs: [&[u64]; 3], at: usize) -> [S::Eight; 2] {
+    if let [Some(below), Some(here), Some(above)] = slabs.map(|slab| chunk(slab, at)) {
+        return join_slabs::<S, ERODE>([below, here, above]);
     }
-    let both = |centre: &[u64], below: &[u64], above: &[u64], out: &mut [u64]| {
-        for (((out, &centre), &below), &above) in out.iter_mut().zip(centre).zip(below).zip(above) {
-            *out = join::<ERODE>(join::<ERODE>(centre, below), above);
+    let mut words = [[nothing::<ERODE>(); LANES]; 3];
+    if at >= slabs[1].len() {
+        return [S::Eight::load(&words[0]); 2];
+    }
+    for (words, slab) in words.iter_mut().zip(slabs) {
+        words.iter_mut().zip(slab.iter().skip(at)).for_each(|(word, &there)| *word = there);
+    }
+    join_slabs::<S, ERODE>(words.each_ref())
+}
+
+/// The words of one step, of those before it, its own and those behind it, of the slab alone and of all three joined.
+#[inline(always)]
+fn step<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
+    [before, here, behind]: [[S::Eight; 2]; 3],
+    [from_low, from_high]: [S::Eight; 2],
+) -> S::Eight {
+    let (centre, sides) = match NEIGHBOURS {
+        6 => (along_y::<S, ROW, ERODE>(here[1], [before[0], here[0], behind[0]]), here[0]),
+        18 => (
+            along_y::<S, ROW, ERODE>(here[1], [before[1], here[1], behind[1]]),
+            along_y::<S, ROW, ERODE>(here[1], [before[0], here[0], behind[0]]),
+        ),
+        _ => {
+            let square = along_y::<S, ROW, ERODE>(here[1], [before[1], here[1], behind[1]]);
+            (square, square)
         }
     };
-    both(&centre[..row], &centre[..row], &sides[row..2 * row], &mut out[..row]);
-    both(&centre[row..rest], &sides[..rest - row], &sides[2 * row..], &mut out[row..rest]);
-    both(&centre[rest..], &sides[rest - row..rest], &centre[rest..], &mut out[rest..]);
+    centre.spread::<ERODE>(sides, from_low, from_high)
 }
 
-/// Joins the points of `centre` with the points beside them in `sides`, along x. `sides` has one more word on either
-/// side, whatever it is.
+/// Joins the words of `centre` with those beside them along y, of the steps before, of this one and behind it.
 #[inline(always)]
-fn along_x<const ERODE: bool>(centre: &[u64], sides: &[u64], ends: &Ends, out: &mut [u64]) {
-    let (from_low, from_high) = (ends.from_low.words(), ends.from_high.words());
-    let (len, end) = (from_low.len(), centre.len());
-    let windows = sides[..end].chunks(len).zip(sides[1..=end].chunks(len)).zip(sides[2..].chunks(len));
-    for ((out, centre), ((low, here), high)) in out.chunks_mut(len).zip(centre.chunks(len)).zip(windows) {
-        let masks = from_low.iter().zip(from_high);
-        let words = centre.iter().zip(low).zip(here).zip(high);
-        for ((out, (((&centre, &low), &here), &high)), (&from_low, &from_high)) in out.iter_mut().zip(words).zip(masks)
-        {
-            let [low, high] = beside([low, here, high]).map(|word| if ERODE { !word } else { word });
-            let sides = low & from_low | high & from_high;
-            *out = if ERODE { centre & !sides } else { centre | sides };
-        }
-    }
+fn along_y<S: Simd, const ROW: usize, const ERODE: bool>(
+    centre: S::Eight,
+    [before, here, behind]: [S::Eight; 3],
+) -> S::Eight {
+    let [low, high] = match ROW {
+        1 => [S::Eight::window::<7>(before, here), S::Eight::window::<1>(here, behind)],
+        2 => [S::Eight::window::<6>(before, here), S::Eight::window::<2>(here, behind)],
+        4 => [S::Eight::window::<4>(before, here), S::Eight::window::<4>(here, behind)],
+        _ => [before, behind],
+    };
+    centre.join::<ERODE>(low).join::<ERODE>(high)
 }
 
 /// The points beside those of a word, at −x and at +x, of the word before it, itself and the word behind it.

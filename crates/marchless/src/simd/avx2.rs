@@ -6,7 +6,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, Job, Recipe, Simd, all, portable::Portable};
+use super::{CODES, Eight, Job, Recipe, Simd, all, portable::Portable};
 
 pub(super) fn is_available() -> bool {
     all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt")
@@ -22,7 +22,105 @@ pub(super) unsafe fn run<J: Job>(job: J) -> J::Output {
 /// Used within [`run`] alone, so that the instructions are there.
 pub(super) struct Avx2;
 
+/// Lanes 0–3 and 4–7. Used within [`run`] alone.
+#[derive(Clone, Copy)]
+pub(super) struct Words([__m256i; 2]);
+
+impl Eight for Words {
+    #[inline(always)]
+    fn load(words: &[u64; 8]) -> Self {
+        let (halves, _) = words.as_chunks::<4>();
+        // SAFETY: within `run`; each load is one half of the words.
+        Self(unsafe { [_mm256_loadu_si256(halves[0].as_ptr().cast()), _mm256_loadu_si256(halves[1].as_ptr().cast())] })
+    }
+
+    #[inline(always)]
+    fn store(self, words: &mut [u64; 8]) {
+        let (halves, _) = words.as_chunks_mut::<4>();
+        for (half, words) in halves.iter_mut().zip(self.0) {
+            // SAFETY: within `run`; each store is one half of the words.
+            unsafe { _mm256_storeu_si256(half.as_mut_ptr().cast(), words) }
+        }
+    }
+
+    #[inline(always)]
+    fn join<const AND: bool>(self, other: Self) -> Self {
+        let ([a, b], [c, d]) = (self.0, other.0);
+        // SAFETY: within `run`.
+        Self(unsafe {
+            if AND {
+                [_mm256_and_si256(a, c), _mm256_and_si256(b, d)]
+            } else {
+                [_mm256_or_si256(a, c), _mm256_or_si256(b, d)]
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn window<const START: usize>(first: Self, second: Self) -> Self {
+        let ([a, b], [c, d]) = (first.0, second.0);
+        // SAFETY: within `run`.
+        Self(unsafe {
+            match START {
+                1 => [one_on(a, b), one_on(b, c)],
+                2 => [_mm256_permute2x128_si256::<0x21>(a, b), _mm256_permute2x128_si256::<0x21>(b, c)],
+                4 => [b, c],
+                6 => [_mm256_permute2x128_si256::<0x21>(b, c), _mm256_permute2x128_si256::<0x21>(c, d)],
+                _ => [three_on(b, c), three_on(c, d)],
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self {
+        let [a, b] = sides.0;
+        // SAFETY: within `run`.
+        Self(unsafe {
+            [
+                spread::<AND>(self.0[0], [three_on(a, a), a, one_on(a, b)], from_low.0[0], from_high.0[0]),
+                spread::<AND>(self.0[1], [three_on(a, b), b, one_on(b, b)], from_low.0[1], from_high.0[1]),
+            ]
+        })
+    }
+}
+
+/// [`Eight::spread`] for half of the lanes, of the sides in the lanes before them, in them and behind them.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn spread<const AND: bool>(
+    centre: __m256i,
+    [below, here, above]: [__m256i; 3],
+    from_low: __m256i,
+    from_high: __m256i,
+) -> __m256i {
+    let low = _mm256_or_si256(_mm256_slli_epi64::<1>(here), _mm256_srli_epi64::<63>(below));
+    let high = _mm256_or_si256(_mm256_srli_epi64::<1>(here), _mm256_slli_epi64::<63>(above));
+    if AND {
+        let (low, high) = (_mm256_andnot_si256(low, from_low), _mm256_andnot_si256(high, from_high));
+        _mm256_andnot_si256(_mm256_or_si256(low, high), centre)
+    } else {
+        let (low, high) = (_mm256_and_si256(low, from_low), _mm256_and_si256(high, from_high));
+        _mm256_or_si256(_mm256_or_si256(low, high), centre)
+    }
+}
+
+/// The lanes 1–4 of two times four.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn one_on(first: __m256i, second: __m256i) -> __m256i {
+    _mm256_permute4x64_epi64::<0b00_11_10_01>(_mm256_blend_epi32::<0b11>(first, second))
+}
+
+/// The lanes 3–6 of two times four.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn three_on(first: __m256i, second: __m256i) -> __m256i {
+    _mm256_permute4x64_epi64::<0b10_01_00_11>(_mm256_blend_epi32::<0b1100_0000>(second, first))
+}
+
 impl Simd for Avx2 {
+    type Eight = Words;
+
     #[inline(always)]
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
         // SAFETY: within `run`.

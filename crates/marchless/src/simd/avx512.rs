@@ -6,7 +6,7 @@
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
 
-use super::{CODES, FACE_CORNERS, Job, Recipe, Simd, all};
+use super::{CODES, Eight, FACE_CORNERS, Job, Recipe, Simd, all};
 
 pub(super) fn is_available() -> bool {
     all!("avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vbmi2", "bmi1", "bmi2", "lzcnt", "popcnt")
@@ -23,6 +23,8 @@ pub(super) unsafe fn run<J: Job>(job: J) -> J::Output {
 pub(super) struct Avx512;
 
 impl Simd for Avx512 {
+    type Eight = Words;
+
     #[inline(always)]
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
         // SAFETY: within `run`.
@@ -80,6 +82,60 @@ impl Simd for Avx512 {
     ) -> usize {
         // SAFETY: within `run`.
         unsafe { self::triangles(recipes, codes, counters, indices) }
+    }
+}
+
+/// Used within [`run`] alone.
+#[derive(Clone, Copy)]
+pub(super) struct Words(__m512i);
+
+impl Eight for Words {
+    #[inline(always)]
+    fn load(words: &[u64; 8]) -> Self {
+        // SAFETY: within `run`; the load is all of the eight words.
+        Self(unsafe { _mm512_loadu_si512(words.as_ptr().cast()) })
+    }
+
+    #[inline(always)]
+    fn store(self, words: &mut [u64; 8]) {
+        // SAFETY: within `run`; the store is all of the eight words.
+        unsafe { _mm512_storeu_si512(words.as_mut_ptr().cast(), self.0) }
+    }
+
+    #[inline(always)]
+    fn join<const AND: bool>(self, other: Self) -> Self {
+        // SAFETY: within `run`.
+        Self(unsafe { if AND { _mm512_and_si512(self.0, other.0) } else { _mm512_or_si512(self.0, other.0) } })
+    }
+
+    #[inline(always)]
+    fn window<const START: usize>(first: Self, second: Self) -> Self {
+        // SAFETY: within `run`.
+        Self(unsafe {
+            match START {
+                1 => _mm512_alignr_epi64::<1>(second.0, first.0),
+                2 => _mm512_alignr_epi64::<2>(second.0, first.0),
+                4 => _mm512_alignr_epi64::<4>(second.0, first.0),
+                6 => _mm512_alignr_epi64::<6>(second.0, first.0),
+                _ => _mm512_alignr_epi64::<7>(second.0, first.0),
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self {
+        // SAFETY: within `run`.
+        Self(unsafe {
+            let low = _mm512_shldi_epi64::<1>(sides.0, _mm512_alignr_epi64::<7>(sides.0, sides.0));
+            let high = _mm512_shrdi_epi64::<1>(sides.0, _mm512_alignr_epi64::<1>(sides.0, sides.0));
+            if AND {
+                let (low, high) = (_mm512_andnot_si512(low, from_low.0), _mm512_andnot_si512(high, from_high.0));
+                _mm512_andnot_si512(_mm512_or_si512(low, high), self.0)
+            } else {
+                let (low, high) = (_mm512_and_si512(low, from_low.0), _mm512_and_si512(high, from_high.0));
+                _mm512_or_si512(_mm512_or_si512(low, high), self.0)
+            }
+        })
     }
 }
 

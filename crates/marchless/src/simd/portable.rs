@@ -1,12 +1,14 @@
 //! Words and plain loops: the oracle of the other backends, and what runs where there are none.
 
-use core::mem::MaybeUninit;
+use core::{array::from_fn, mem::MaybeUninit};
 
-use super::{CODES, Recipe, Simd};
+use super::{CODES, Eight, Recipe, Simd};
 
 pub(super) struct Portable;
 
 impl Simd for Portable {
+    type Eight = [u64; 8];
+
     #[inline(always)]
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
         below(weights, threshold)
@@ -77,6 +79,39 @@ impl Simd for Portable {
         }
         *counters = running;
         end
+    }
+}
+
+impl Eight for [u64; 8] {
+    #[inline(always)]
+    fn load(words: &[u64; 8]) -> Self {
+        *words
+    }
+
+    #[inline(always)]
+    fn store(self, words: &mut [u64; 8]) {
+        *words = self;
+    }
+
+    #[inline(always)]
+    fn join<const AND: bool>(self, other: Self) -> Self {
+        from_fn(|lane| if AND { self[lane] & other[lane] } else { self[lane] | other[lane] })
+    }
+
+    #[inline(always)]
+    fn window<const START: usize>(first: Self, second: Self) -> Self {
+        from_fn(|lane| if lane + START < 8 { first[lane + START] } else { second[(lane + START) % 8] })
+    }
+
+    #[inline(always)]
+    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self {
+        let sides = if AND { sides.map(|word| !word) } else { sides };
+        from_fn(|lane| {
+            let low = sides[lane] << 1 | sides[(lane + 7) % 8] >> 63;
+            let high = sides[lane] >> 1 | sides[(lane + 1) % 8] << 63;
+            let sides = low & from_low[lane] | high & from_high[lane];
+            if AND { self[lane] & !sides } else { self[lane] | sides }
+        })
     }
 }
 

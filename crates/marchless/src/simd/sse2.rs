@@ -8,6 +8,8 @@ use super::{CODES, Recipe, Simd, portable::Portable};
 pub(super) struct Sse2;
 
 impl Simd for Sse2 {
+    type Eight = [u64; 8];
+
     #[inline(always)]
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32 {
         // SAFETY: SSE2 is available; both loads lie within the 32 weights.
