@@ -36,8 +36,14 @@ impl Job for FillPlanes<'_> {
 fn bits<S: Simd>(bytes: &[u8; 64], k: usize) -> u64 {
     let mut word = 0;
     for (half, bytes) in bytes.as_chunks::<32>().0.iter().enumerate() {
-        // Where it is the sign.
-        let signs = bytes.map(|byte| (byte << (7 - k)).cast_signed());
+        // Where it is the sign; what comes over from the byte below stays below that.
+        let mut signs = [0; 32];
+        for (signs, &eight) in signs.as_chunks_mut::<8>().0.iter_mut().zip(bytes.as_chunks::<8>().0) {
+            let shifted = (u64::from_le_bytes(eight) << (7 - k)).to_le_bytes();
+            for (sign, byte) in signs.iter_mut().zip(shifted) {
+                *sign = byte.cast_signed();
+            }
+        }
         word |= u64::from(S::below_i8(&signs, 0)) << (32 * half);
     }
     word

@@ -14,8 +14,8 @@ use crate::{bits::BitGrid, buffer::MeshBuffer, math::sqrt_f64, mesher::clamped};
 
 /// Evaluations a vertex, besides those at both ends of its edge.
 const STEPS: usize = 6;
-/// A step shorter than this many edges is the last; about what `f32` positions tell apart.
-const TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
+/// A step shorter than what positions tell apart is the last: this part of the coordinate, and of 8 where it is less.
+const TOLERANCE: f64 = 1.0 / (1 << 23) as f64;
 /// How far from a vertex, in cells, its gradient is taken; a power of two, so that coordinates are exact.
 const REACH: f32 = 1.0 / 8.0;
 
@@ -75,10 +75,11 @@ impl CrossedEdge {
         }
         // The zero lies between these two, of which the first is the newer one.
         let (mut newest, mut other) = (low, high);
+        let tolerance = TOLERANCE * f64::from(self.low[self.axis].max(8));
         let (mut step, mut last) = (newest.1 / (newest.1 - other.1), f64::NAN);
         for _ in 0..STEPS {
             let fraction = newest.0 + step * (other.0 - newest.0);
-            if (fraction - last).abs() < TOLERANCE {
+            if (fraction - last).abs() < tolerance {
                 break;
             }
             let value = value_at(fraction)?;
