@@ -47,6 +47,7 @@
 //! `pbr` (materials), `gizmos` (bounds of chunks), `noise` and `png` (sources); all are on by default. Without them, and
 //! without any renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
 
+pub mod bits;
 pub mod brush;
 pub mod chunk;
 pub mod debug;
@@ -67,6 +68,7 @@ pub use marchless;
 /// What a game that uses terrain usually needs.
 pub mod prelude {
     pub use crate::MarchlessPlugins;
+    pub use crate::bits::{BitsSnapshot, Medium, Piece, TerrainBits, TerrainBitsError};
     pub use crate::brush::{BrushOperation, BrushShape, Stamp, Stroke, TerrainEdited};
     pub use crate::chunk::{Chunk, ChunkGeometry};
     pub use crate::debug::DebugPlugin;
@@ -79,6 +81,8 @@ pub mod prelude {
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
     pub use crate::source::*;
     pub use crate::terrain::{Palette, SourceHandle, Terrain, TerrainError, TerrainVolume};
+    pub use marchless::Region;
+    pub use marchless::bits::BitGrid;
 }
 
 plugin_group! {

@@ -75,6 +75,7 @@ fn refill(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, queue: 
     let extent = extent_of(terrain);
     volume.forget_work();
     volume.grid = empty_grid(terrain);
+    volume.bits.clear();
     volume.filling = new_number();
     volume.unfilled = volume.chunks.len();
     for (&position, state) in &mut volume.chunks {

@@ -9,6 +9,7 @@ use bevy_reflect::prelude::*;
 use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, Region, Stamp};
 
 use super::Terrain;
+use crate::bits::BitsCache;
 use crate::mesh::{Colors, Meshed};
 use crate::stats::Since;
 use crate::work::{Ticket, new_number};
@@ -57,6 +58,9 @@ pub struct TerrainVolume {
     /// Which group works on a chunk. No chunk is in two groups, so results can never be shown out of order.
     #[reflect(ignore)]
     pub(crate) claims: BTreeMap<[i32; 3], u64>,
+    /// Which of the newest samples are solid.
+    #[reflect(ignore)]
+    pub(crate) bits: BitsCache,
 }
 
 /// One chunk of a volume.
@@ -116,6 +120,7 @@ impl Default for TerrainVolume {
             pending: Vec::new(),
             groups: BTreeMap::new(),
             claims: BTreeMap::new(),
+            bits: BitsCache::default(),
         }
     }
 }

@@ -1,0 +1,182 @@
+//! [`BitsCache`]: which samples of a terrain are solid, one bit each, chunk by chunk.
+//!
+//! Bits are derived once, by whoever needs them first and on whatever thread, and shared from then on. Samples lie behind
+//! an `Arc` and are copied on write, so their address tells whether they have changed: the cache holds a `Weak`, because
+//! of which an edit has to move them to another address even where nobody else holds them.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+
+use marchless::bits::BitGrid;
+use marchless::{Chunk, ChunkSamples, Region, Samples, Shape, Weight as _};
+
+use super::TerrainBitsError;
+use crate::terrain::TerrainVolume;
+
+/// The bits of those chunks of a terrain that somebody has asked for.
+#[derive(Default)]
+pub(crate) struct BitsCache(Mutex<BTreeMap<[i32; 3], Entry>>);
+
+struct Entry {
+    /// What the bits are derived from.
+    samples: Weak<ChunkSamples<i16>>,
+    recipe: Recipe,
+    bits: Arc<OnceLock<Derived>>,
+}
+
+/// What is solid in a chunk.
+#[derive(Debug)]
+pub(super) enum Derived {
+    /// All of it, or nothing.
+    Uniform(bool),
+    /// The chunk's points; a row is one word.
+    Mixed(BitGrid),
+}
+
+/// What is solid in a chunk, not derived before somebody looks. Cheap to clone, and unaffected by later edits.
+#[derive(Clone, Debug)]
+pub(super) enum ChunkBits {
+    Uniform(bool),
+    Lazy { samples: Arc<ChunkSamples<i16>>, recipe: Recipe, bits: Arc<OnceLock<Derived>> },
+}
+
+/// What bits depend on besides samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Recipe {
+    isovalue: f32,
+    cells: u32,
+    /// For each axis, whether the chunk's lowest layer lies on the terrain's outermost plane, where all is air.
+    lowest: [bool; 3],
+}
+
+impl BitsCache {
+    /// Forgets all bits.
+    pub(crate) fn clear(&self) {
+        self.lock().clear();
+    }
+
+    /// Where the bits of a chunk with these samples are, or will be.
+    fn place(&self, position: [i32; 3], samples: &Arc<ChunkSamples<i16>>, recipe: Recipe) -> Arc<OnceLock<Derived>> {
+        let mut entries = self.lock();
+        let is_current =
+            |entry: &&Entry| core::ptr::eq(entry.samples.as_ptr(), Arc::as_ptr(samples)) && entry.recipe == recipe;
+        if let Some(entry) = entries.get(&position).filter(is_current) {
+            return entry.bits.clone();
+        }
+        let bits = Arc::<OnceLock<Derived>>::default();
+        entries.insert(position, Entry { samples: Arc::downgrade(samples), recipe, bits: bits.clone() });
+        bits
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<[i32; 3], Entry>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl ChunkBits {
+    /// What is solid in the chunk at `position`.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::NotFilled`].
+    pub(super) fn new(volume: &TerrainVolume, isovalue: f32, position: [i32; 3]) -> Result<Self, TerrainBitsError> {
+        match volume.grid.chunk(position) {
+            None => Err(TerrainBitsError::NotFilled { chunk: position.into() }),
+            Some(Chunk::Uniform(voxel)) => Ok(Self::Uniform(voxel.weight.to_voxels() < isovalue)),
+            Some(Chunk::Samples(samples)) => {
+                let lowest = volume
+                    .grid
+                    .bounds()
+                    .map_or([false; 3], |bounds| [0, 1, 2].map(|axis| position[axis] == bounds.min[axis]));
+                let recipe = Recipe { isovalue, cells: volume.grid.chunk_cells(), lowest };
+                let bits = volume.bits.place(position, samples, recipe);
+                Ok(Self::Lazy { samples: samples.clone(), recipe, bits })
+            }
+        }
+    }
+
+    /// What is solid; derived where that has not been done.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::Bits`] where memory does not suffice.
+    pub(super) fn get(&self) -> Result<&Derived, TerrainBitsError> {
+        match self {
+            Self::Uniform(true) => Ok(&Derived::Uniform(true)),
+            Self::Uniform(false) => Ok(&Derived::Uniform(false)),
+            Self::Lazy { samples, recipe, bits } => {
+                if let Some(derived) = bits.get() {
+                    return Ok(derived);
+                }
+                let derived = recipe.derive(samples)?;
+                Ok(bits.get_or_init(|| derived))
+            }
+        }
+    }
+}
+
+impl Recipe {
+    fn derive(&self, samples: &ChunkSamples<i16>) -> Result<Derived, TerrainBitsError> {
+        let shape = Shape::cube(self.cells).expect("a chunk has samples");
+        let samples = Samples::new(shape, &samples.weights).expect("the grid has checked their number");
+        let mut bits = BitGrid::from_samples(samples, self.isovalue)?;
+        // Samples there are half a voxel outside; meshes at a higher isovalue are cut off as well.
+        for axis in (0..3).filter(|axis| self.lowest[*axis]) {
+            let mut layer = Region::new([0; 3], [self.cells as i32; 3]);
+            layer.max[axis] = 1;
+            bits.fill(layer, false);
+        }
+        Ok(match bits.count() {
+            0 => Derived::Uniform(false),
+            count if count == shape.len() => Derived::Uniform(true),
+            _ => Derived::Mixed(bits),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use marchless::{Grid, Voxel};
+
+    fn place(volume: &TerrainVolume, isovalue: f32) -> Arc<OnceLock<Derived>> {
+        match ChunkBits::new(volume, isovalue, [0; 3]).expect("it is filled") {
+            ChunkBits::Lazy { bits, .. } => bits,
+            ChunkBits::Uniform(_) => panic!("it has samples"),
+        }
+    }
+
+    #[test]
+    fn bits_are_shared_until_the_samples_change() {
+        let mut volume =
+            TerrainVolume { grid: Grid::bounded(8, Region::new([0; 3], [1; 3])).unwrap(), ..Default::default() };
+        let solid = Voxel::new(-256, 0);
+        volume.grid.set([3, 3, 3], solid).unwrap();
+        // With nobody else who holds the samples, and with somebody.
+        for others in [vec![], vec![volume.grid.clone()]] {
+            let first = place(&volume, 0.0);
+            assert!(Arc::ptr_eq(&first, &place(&volume, 0.0)), "asked for twice");
+            let with_other_isovalue = place(&volume, 0.25);
+            assert!(!Arc::ptr_eq(&first, &with_other_isovalue));
+            volume.grid.set([4, 4, 4], solid).unwrap();
+            let after = place(&volume, 0.25);
+            assert!(!Arc::ptr_eq(&with_other_isovalue, &after));
+            volume.grid.set([4, 4, 4], Voxel::AIR).unwrap();
+            assert!(!Arc::ptr_eq(&after, &place(&volume, 0.25)), "as before, but not known to be");
+            drop(others);
+        }
+        volume.bits.clear();
+        assert!(volume.bits.lock().is_empty());
+    }
+
+    #[test]
+    fn a_chunk_that_is_uniform_costs_no_bits() {
+        let mut volume =
+            TerrainVolume { grid: Grid::bounded(8, Region::new([0; 3], [1; 3])).unwrap(), ..Default::default() };
+        volume.grid.insert([0; 3], Chunk::AIR).unwrap();
+        assert!(matches!(ChunkBits::new(&volume, 0.0, [0; 3]), Ok(ChunkBits::Uniform(false))));
+        assert!(volume.bits.lock().is_empty());
+        // Samples that differ, but are all air.
+        volume.grid.set([3, 3, 3], Voxel::new(256, 0)).unwrap();
+        let bits = ChunkBits::new(&volume, 0.0, [0; 3]).unwrap();
+        assert!(matches!(bits.get(), Ok(Derived::Uniform(false))));
+    }
+}

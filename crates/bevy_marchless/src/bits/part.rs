@@ -1,0 +1,112 @@
+//! [`Part`]: what a question reads of one chunk.
+
+use bevy_math::Vec3;
+use marchless::Region;
+use marchless::bits::BitGrid;
+
+use super::TerrainBitsError;
+use super::cache::{ChunkBits, Derived};
+use crate::terrain::TerrainVolume;
+
+/// What a question reads of one chunk; everything in the terrain's lattice.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    /// Points of the chunk; never empty.
+    region: Region,
+    /// The chunk's lowest point.
+    origin: [i32; 3],
+    bits: ChunkBits,
+}
+
+/// What of `region` lies within the terrain's outermost planes: on them and beyond, all is air.
+pub(super) fn within(volume: &TerrainVolume, region: Region) -> Region {
+    let Some(planes) = volume.grid.planes() else { return NOTHING };
+    Region::new(planes.min.map(|v| v + 1), planes.max).intersection(&region)
+}
+
+/// What `region` has in common with each chunk; beyond the chunks all is air.
+pub(super) fn parts(
+    volume: &TerrainVolume,
+    isovalue: f32,
+    region: Region,
+) -> impl Iterator<Item = Result<Part, TerrainBitsError>> + '_ {
+    let inside = within(volume, region);
+    let chunks = if inside.is_empty() {
+        NOTHING
+    } else {
+        let last = volume.grid.chunk_of(inside.max.map(|v| v - 1));
+        Region::new(volume.grid.chunk_of(inside.min), last.map(|v| v + 1))
+    };
+    chunks.points().map(move |position| {
+        let chunk = volume.grid.chunk_region(position);
+        let bits = ChunkBits::new(volume, isovalue, position)?;
+        Ok(Part { region: chunk.intersection(&inside), origin: chunk.min, bits })
+    })
+}
+
+const NOTHING: Region = Region::new([0; 3], [0; 3]);
+
+impl Part {
+    /// Whether all of it is solid.
+    pub(super) fn is_solid(&self) -> Result<bool, TerrainBitsError> {
+        Ok(match self.bits.get()? {
+            Derived::Uniform(solid) => *solid,
+            Derived::Mixed(grid) => grid.covers_region(relative(self.region, self.origin)),
+        })
+    }
+
+    /// Whether some of it is solid.
+    pub(super) fn is_partly_solid(&self) -> Result<bool, TerrainBitsError> {
+        Ok(match self.bits.get()? {
+            Derived::Uniform(solid) => *solid,
+            Derived::Mixed(grid) => grid.overlaps_region(relative(self.region, self.origin)),
+        })
+    }
+
+    /// Whether a solid point of it is at most `radius` from `center`.
+    pub(super) fn overlaps_ball(&self, center: Vec3, radius: f32) -> Result<bool, TerrainBitsError> {
+        Ok(match self.bits.get()? {
+            Derived::Uniform(solid) => *solid && ball_reaches(center, radius, self.region),
+            Derived::Mixed(grid) => {
+                let origin = Vec3::from(self.origin.map(|v| v as f32));
+                grid.overlaps_ball((center - origin).to_array(), radius)
+            }
+        })
+    }
+
+    /// Whether a solid point of it is a point of `shape`, whose lowest corner lies at `offset`.
+    pub(super) fn overlaps(&self, shape: &BitGrid, offset: [i32; 3]) -> Result<bool, TerrainBitsError> {
+        Ok(match self.bits.get()? {
+            Derived::Uniform(solid) => *solid && shape.overlaps_region(relative(self.region, offset)),
+            Derived::Mixed(grid) => grid.overlaps(shape, difference(offset, self.origin)),
+        })
+    }
+
+    /// Writes the part into a grid of zeros whose lowest corner lies at `corner`.
+    pub(super) fn write(&self, grid: &mut BitGrid, corner: [i32; 3]) -> Result<(), TerrainBitsError> {
+        match self.bits.get()? {
+            Derived::Uniform(false) => {}
+            Derived::Uniform(true) => grid.fill(relative(self.region, corner), true),
+            Derived::Mixed(bits) => grid.paste(bits, difference(self.origin, corner)),
+        }
+        Ok(())
+    }
+}
+
+/// A region as seen from `corner`.
+fn relative(region: Region, corner: [i32; 3]) -> Region {
+    Region::new(difference(region.min, corner), difference(region.max, corner))
+}
+
+fn difference(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
+    [0, 1, 2].map(|axis| a[axis].saturating_sub(b[axis]))
+}
+
+/// Whether some point of a region that is not empty is at most `radius` from `center`.
+fn ball_reaches(center: Vec3, radius: f32, region: Region) -> bool {
+    let distances = [0, 1, 2].map(|axis| {
+        let center = f64::from(center[axis]);
+        center.round().clamp(f64::from(region.min[axis]), f64::from(region.max[axis] - 1)) - center
+    });
+    distances.iter().map(|distance| distance * distance).sum::<f64>() <= f64::from(radius) * f64::from(radius)
+}

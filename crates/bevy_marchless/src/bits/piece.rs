@@ -1,0 +1,144 @@
+//! [`Piece`]: a part of what is solid that hangs together.
+
+use core::fmt;
+use std::sync::Arc;
+
+use bevy_ecs::entity::Entity;
+use bevy_math::IVec3;
+use marchless::Region;
+use marchless::bits::{BitGrid, Component, Connectivity};
+
+use crate::brush::{BrushShape, Stamp};
+
+/// A part of what is solid in a box of a terrain that hangs together, as it was when it was found.
+#[derive(Clone)]
+pub struct Piece {
+    bounds: Region,
+    first: [i32; 3],
+    size: usize,
+    is_held: bool,
+    /// The whole box, and its lowest point.
+    solid: Arc<BitGrid>,
+    corner: [i32; 3],
+}
+
+impl Piece {
+    pub(super) fn new(component: Component, region: Region, solid: &Arc<BitGrid>) -> Self {
+        let place = |point: [i32; 3]| [0, 1, 2].map(|axis| region.min[axis] + point[axis]);
+        let bounds = Region::new(place(component.bounds.min), place(component.bounds.max));
+        Self {
+            bounds,
+            first: place(component.first.map(|v| v as i32)),
+            size: component.size,
+            is_held: (0..3).any(|axis| bounds.min[axis] == region.min[axis] || bounds.max[axis] == region.max[axis]),
+            solid: solid.clone(),
+            corner: region.min,
+        }
+    }
+
+    /// The smallest box around it, in the terrain's lattice.
+    pub const fn bounds(&self) -> Region {
+        self.bounds
+    }
+
+    /// How many points it has: its volume in cubic voxels.
+    pub const fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Its first point, in order of z, then y, then x.
+    pub fn first(&self) -> IVec3 {
+        self.first.into()
+    }
+
+    /// Whether it touches the border of the box in which it was found, or of the terrain, and so counts as held: it may
+    /// go on beyond that box, and at the terrain's walls and bottom something must hold the ground. What is not held
+    /// hangs free: it is whole, and nothing solid is next to it.
+    pub const fn is_held(&self) -> bool {
+        self.is_held
+    }
+
+    /// Its points: a grid of the size of its bounds, whose lowest point is the grid's point `[0, 0, 0]`.
+    pub fn bits(&self) -> BitGrid {
+        let first = [0, 1, 2].map(|axis| self.first[axis].abs_diff(self.bounds.min[axis]));
+        self.around().flood(&[first], Connectivity::Six).expect("its first point lies in its bounds")
+    }
+
+    /// All that is solid in its bounds.
+    fn around(&self) -> BitGrid {
+        let [min, max] = [self.bounds.min, self.bounds.max];
+        let [min, max] = [min, max].map(|end| [0, 1, 2].map(|axis| end[axis] - self.corner[axis]));
+        self.solid.cut(Region::new(min, max)).expect("the box in which it was found is larger")
+    }
+
+    /// Stamps that dig it out of `terrain`, and nothing else: all its points become air, and no other point changes sides.
+    /// Surfaces less than half a voxel away may move a little.
+    ///
+    /// `isovalue`: the terrain's; from −0.4 to 3, in voxels. (At lower ones, solid points next to the piece's corners may go
+    /// with it.) What the terrain has become since the piece was found, the stamps do not know: write them in
+    /// the same update, or ask again before.
+    pub fn stamps(&self, terrain: Entity, isovalue: f32) -> Vec<Stamp> {
+        let (own, mut others) = (self.bits(), self.around());
+        others.subtract(&own).expect("both have the size of its bounds");
+        // How far beyond its outermost points a box ends: at these, samples become half a voxel of air, and at those
+        // next to them at least half a voxel of ground stays.
+        let rim = if isovalue.is_finite() { (0.5 + isovalue).clamp(0.1, 3.5) } else { 0.5 };
+        let origin = IVec3::from(self.bounds.min).as_vec3();
+        let mut stamps = Vec::new();
+        let mut regions = vec![Region::new([0; 3], self.bounds.size().map(|v| v as i32))];
+        while let Some(region) = regions.pop() {
+            let Some(region) = shrunk(&own, region) else { continue };
+            let size = region.size();
+            let axis = (0..3).max_by_key(|axis| size[*axis]).unwrap_or(0);
+            if size[axis] <= LONGEST_BOX && !others.overlaps_region(region) {
+                let [low, high] = [region.min, region.max.map(|v| v - 1)].map(|end| IVec3::from(end).as_vec3());
+                let shape = BrushShape::cuboid(origin + 0.5 * (low + high), 0.5 * (high - low) + rim);
+                stamps.push(Stamp::dig(terrain, shape));
+                continue;
+            }
+            let (mut low, mut high) = (region, region);
+            low.max[axis] = region.min[axis] + (size[axis] / 2) as i32;
+            high.min[axis] = low.max[axis];
+            regions.extend([high, low]);
+        }
+        stamps
+    }
+}
+
+/// The longest box that one stamp digs. [Units: voxels]
+const LONGEST_BOX: u32 = 2000;
+
+/// The smallest box around what is set in a region.
+fn shrunk(bits: &BitGrid, mut region: Region) -> Option<Region> {
+    if !bits.overlaps_region(region) {
+        return None;
+    }
+    for axis in 0..3 {
+        let layer = |at: i32| {
+            let mut layer = region;
+            (layer.min[axis], layer.max[axis]) = (at, at + 1);
+            bits.overlaps_region(layer)
+        };
+        let mut layers = region.min[axis]..region.max[axis];
+        let (low, high) = (layers.find(|at| layer(*at))?, layers.rfind(|at| layer(*at)));
+        (region.min[axis], region.max[axis]) = (low, high.unwrap_or(low) + 1);
+    }
+    Some(region)
+}
+
+impl fmt::Debug for Piece {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bounds, first, size, is_held, .. } = self;
+        let mut debug = f.debug_struct("Piece");
+        debug.field("bounds", bounds).field("first", first).field("size", size).field("is_held", is_held);
+        debug.finish_non_exhaustive()
+    }
+}
+
+/// Pieces are equal where their points are.
+impl PartialEq for Piece {
+    fn eq(&self, other: &Self) -> bool {
+        let summary = |piece: &Self| (piece.bounds, piece.first, piece.size, piece.is_held);
+        summary(self) == summary(other) && self.bits() == other.bits()
+    }
+}

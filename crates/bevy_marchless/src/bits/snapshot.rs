@@ -1,0 +1,143 @@
+//! [`BitsSnapshot`]: a box of a terrain as it is now, to be asked on any thread.
+
+use core::fmt;
+use std::sync::Arc;
+
+use bevy_math::IVec3;
+use bevy_tasks::{AsyncComputeTaskPool, Task, TaskPool};
+use marchless::bits::{BitGrid, Connectivity};
+use marchless::{Region, Shape};
+
+use super::part::Part;
+use super::{Medium, Piece, TerrainBits, TerrainBitsError};
+
+/// A box of a terrain as it was when the snapshot was taken, whatever becomes of the terrain: what
+/// [`TerrainBits`] answers about boxes, on any thread.
+///
+/// Taking one copies nothing: it shares the samples with the terrain, and bits that it derives are kept there for others.
+/// As long as it lives, an edit in the box has to copy the chunk's samples.
+#[derive(Clone)]
+pub struct BitsSnapshot {
+    /// What was asked for.
+    pub(super) region: Region,
+    /// What of it may be solid.
+    pub(super) inside: Region,
+    pub(super) parts: Vec<Part>,
+}
+
+impl BitsSnapshot {
+    /// The box, in the terrain's lattice.
+    pub const fn region(&self) -> Region {
+        self.region
+    }
+
+    /// Asks in a task of the [`AsyncComputeTaskPool`]. Dropping the task withdraws the question.
+    ///
+    /// ```
+    /// use bevy_marchless::prelude::*;
+    /// # use bevy_ecs::prelude::*;
+    /// use bevy_tasks::{Task, futures::check_ready};
+    ///
+    /// #[derive(Resource, Default)]
+    /// struct Search(Option<Task<Result<Vec<Piece>, TerrainBitsError>>>);
+    ///
+    /// fn ask(mut edits: MessageReader<TerrainEdited>, bits: TerrainBits, mut search: ResMut<Search>) {
+    ///     for edited in edits.read() {
+    ///         let region = Region::new(edited.min.to_array(), edited.max.to_array()).grown(64, 64);
+    ///         if let Ok(snapshot) = bits.snapshot(edited.terrain, region) {
+    ///             search.0 = Some(snapshot.in_task(|snapshot| snapshot.pieces()));
+    ///         }
+    ///     }
+    /// }
+    ///
+    /// fn answer(mut search: ResMut<Search>) {
+    ///     if let Some(Ok(pieces)) = search.0.as_mut().and_then(check_ready) {
+    ///         println!("{} pieces hang free", pieces.iter().filter(|piece| !piece.is_held()).count());
+    ///         search.0 = None;
+    ///     }
+    /// }
+    /// ```
+    pub fn in_task<T: Send + 'static>(self, question: impl FnOnce(&Self) -> T + Send + 'static) -> Task<T> {
+        AsyncComputeTaskPool::get_or_init(TaskPool::default).spawn(async move { question(&self) })
+    }
+
+    /// The bits of the box: its lowest point is the grid's point `[0, 0, 0]`.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::Empty`], [`TerrainBitsError::TooLarge`].
+    pub fn bits(&self) -> Result<BitGrid, TerrainBitsError> {
+        self.assemble(self.region)
+    }
+
+    /// Whether a way within the box leads from `a` to `b` through what is solid, or through the air. As surfaces have
+    /// it, solid points are neighbours along the axes, and points of air along the diagonals of faces, too.
+    ///
+    /// `false` where one of them is outside the box or of the other medium.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::TooLarge`].
+    pub fn connected(&self, a: IVec3, b: IVec3, medium: Medium) -> Result<bool, TerrainBitsError> {
+        let (region, connectivity) = match medium {
+            Medium::Solid => (self.inside, Connectivity::Six),
+            Medium::Air => (self.region, Connectivity::Eighteen),
+        };
+        let ends = [a, b].map(|end| end.to_array());
+        if !ends.iter().all(|end| region.contains(*end)) {
+            return Ok(false);
+        }
+        let mut mask = self.assemble(region)?;
+        if medium == Medium::Air {
+            mask.invert();
+        }
+        let [a, b] = ends.map(|end| [0, 1, 2].map(|axis| end[axis].abs_diff(region.min[axis])));
+        Ok(mask.get(a) && mask.get(b) && mask.flood(&[a], connectivity)?.get(b))
+    }
+
+    /// The pieces that what is solid in the box falls into, numbered by their first points, x fastest.
+    ///
+    /// Solid points are neighbours along the axes, as surfaces have it: pieces touch at edges and corners at most, and
+    /// the mesh of each is closed. [`Piece::is_held`] tells which of them may go on beyond the box.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::TooLarge`].
+    pub fn pieces(&self) -> Result<Vec<Piece>, TerrainBitsError> {
+        if self.inside.is_empty() {
+            return Ok(Vec::new());
+        }
+        let solid = Arc::new(self.assemble(self.inside)?);
+        let components = solid.components(Connectivity::Six);
+        Ok(components.iter().map(|component| Piece::new(*component, self.inside, &solid)).collect())
+    }
+
+    /// Those of the [pieces](Self::pieces) that hang free.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::TooLarge`].
+    pub fn loose_pieces(&self) -> Result<Vec<Piece>, TerrainBitsError> {
+        let mut pieces = self.pieces()?;
+        pieces.retain(|piece| !piece.is_held());
+        Ok(pieces)
+    }
+
+    fn assemble(&self, region: Region) -> Result<BitGrid, TerrainBitsError> {
+        let [nx, ny, nz] = region.size();
+        let shape = Shape::new([nx, ny, nz]).map_err(|_| {
+            if region.is_empty() { TerrainBitsError::Empty { region } } else { TerrainBitsError::TooLarge { region } }
+        })?;
+        let words = u128::from(nx.div_ceil(64)) * u128::from(ny) * u128::from(nz);
+        if words > u128::from(TerrainBits::MAX_WORDS) {
+            return Err(TerrainBitsError::TooLarge { region });
+        }
+        let mut bits = BitGrid::new(shape)?;
+        for part in &self.parts {
+            part.write(&mut bits, region.min)?;
+        }
+        Ok(bits)
+    }
+}
+
+impl fmt::Debug for BitsSnapshot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BitsSnapshot").field("region", &self.region).finish_non_exhaustive()
+    }
+}
