@@ -7,8 +7,9 @@
 //! the environment, they fail, lest nobody judges any more.
 //!
 //! Four fields of 35³ and 64³ `i16` samples, padding included, with normals, on the portable and the AVX2 backend, each
-//! forced, in both topologies, into warm buffers. The fields are sampled before valgrind starts, since noise under valgrind takes long;
-//! what starts under it is this program again, told to mesh one file. Valgrind knows no AVX-512.
+//! forced, in both topologies, into warm buffers; and operations on the bits of 128³ caves, on AVX2 alone: they choose
+//! the fastest backend themselves, and valgrind knows no AVX-512. The fields are sampled before valgrind starts, since
+//! noise under valgrind takes long; what starts under it is this program again, told to do one thing with one file.
 
 use core::{fmt, hint::black_box};
 use std::{
@@ -19,7 +20,10 @@ use std::{
     process::{Command, ExitCode},
 };
 
-use marchless::{Backend, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
+use marchless::{
+    Backend, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight,
+    bits::{BitGrid, BitsError, Connectivity},
+};
 use marchless_benches::Field;
 
 const FIELDS: [Field; 4] = [Field::Sphere, Field::Terrain, Field::Caves, Field::WhiteNoise];
@@ -27,6 +31,9 @@ const SIZES: [u32; 2] = [35, 64];
 const BACKENDS: [Backend; 2] = [Backend::Portable, Backend::Avx2];
 /// What the names of their rows end with.
 const TOPOLOGIES: [&str; 2] = ["", " trilinear"];
+/// What is done with bits, and to how many samples per axis of which field.
+const OPERATIONS: [&str; 6] = ["case-masks", "shift", "and", "dilation", "flood", "components"];
+const BITS: (Field, u32) = (Field::Caves, 128);
 /// How many times the baseline a count may be.
 const ALLOWED: f64 = 1.03;
 const RENEW: &str = "cargo run --release -p marchless_benches --bin instructions -- --renew";
@@ -39,6 +46,7 @@ fn main() -> ExitCode {
         ["--renew"] => renew(),
         ["mesh", file, size, backend] => mesh(Path::new(file), size, backend, Topology::Separated),
         ["mesh", file, size, backend, "trilinear"] => mesh(Path::new(file), size, backend, Topology::Trilinear),
+        ["bits", file, size, operation] => operate(Path::new(file), size, operation),
         _ => Err("expected no arguments, or `--renew`".into()),
     };
     match done {
@@ -102,11 +110,11 @@ fn baseline_path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("instructions.txt")
 }
 
-/// Instructions by what was meshed, and the compiler that made them.
+/// Instructions by what was done, and the compiler that made them.
 #[derive(Debug, PartialEq)]
 struct Counts {
     compiler: String,
-    /// "FIELD SIZE BACKEND" and instructions.
+    /// "FIELD SIZE BACKEND TOPOLOGY", or "FIELD SIZE BACKEND bits OPERATION", and instructions.
     of: Vec<(String, u64)>,
 }
 
@@ -144,6 +152,7 @@ impl fmt::Display for Counts {
             f,
             "# Instructions of meshing once, as callgrind counts them: field, samples per axis, backend, topology, count."
         )?;
+        writeln!(f, "# And of one operation on bits: field, points per axis, backend, bits, operation, count.")?;
         writeln!(f, "# Written by `{RENEW}` with")?;
         writeln!(f, "# {}", self.compiler)?;
         self.of.iter().try_for_each(|(what, count)| writeln!(f, "{what:34} {count}"))
@@ -154,10 +163,7 @@ fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
     let mut counts = Vec::new();
     for field in FIELDS {
         for size in SIZES {
-            let name = field.name().replace(' ', "-");
-            let file = folder.join(format!("{name}-{size}.i16"));
-            let weights = field.distances(size).into_iter().map(i16::from_voxels);
-            fs::write(&file, weights.flat_map(i16::to_le_bytes).collect::<Vec<_>>())?;
+            let (name, file) = sampled(folder, field, size)?;
             for backend in BACKENDS {
                 if !backend.is_available() {
                     println!("{name} {size} {}: skipped, this machine has no such instructions", backend.name());
@@ -165,21 +171,41 @@ fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
                 }
                 for topology in TOPOLOGIES {
                     let what = format!("{name} {size} {}{topology}", backend.name());
-                    let count = count(&file, size, backend, topology).map_err(|error| format!("{what}: {error}"))?;
+                    let rest = format!("{size} {} {topology}", backend.name());
+                    let count = count("mesh", &file, &rest).map_err(|error| format!("{what}: {error}"))?;
                     counts.push((what, count));
                 }
             }
         }
     }
+    if !Backend::Avx2.is_available() {
+        println!("bits: skipped, this machine has no AVX2");
+        return Ok(counts);
+    }
+    let (field, size) = BITS;
+    let (name, file) = sampled(folder, field, size)?;
+    for operation in OPERATIONS {
+        let what = format!("{name} {size} {} bits {operation}", Backend::Avx2.name());
+        let count = count("bits", &file, &format!("{size} {operation}")).map_err(|error| format!("{what}: {error}"))?;
+        counts.push((what, count));
+    }
     Ok(counts)
 }
 
+/// Samples a field; its name in rows, and the file with its weights.
+fn sampled(folder: &Path, field: Field, size: u32) -> io::Result<(String, PathBuf)> {
+    let name = field.name().replace(' ', "-");
+    let file = folder.join(format!("{name}-{size}.i16"));
+    let weights = field.distances(size).into_iter().map(i16::from_voxels);
+    fs::write(&file, weights.flat_map(i16::to_le_bytes).collect::<Vec<_>>())?;
+    Ok((name, file))
+}
+
 /// Runs this program under callgrind, on one file.
-fn count(file: &Path, size: u32, backend: Backend, topology: &str) -> Result<u64, Box<dyn Error>> {
+fn count(task: &str, file: &Path, rest: &str) -> Result<u64, Box<dyn Error>> {
     let mut command = Command::new("valgrind");
-    command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*mesh_and_count*"]);
-    command.arg(env::current_exe()?).arg("mesh").arg(file).args([&size.to_string(), backend.name()]);
-    command.args(topology.split_whitespace());
+    command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*_and_count*"]);
+    command.arg(env::current_exe()?).arg(task).arg(file).args(rest.split_whitespace());
     let output = command.output().map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => "valgrind is not installed".to_owned(),
         _ => format!("valgrind does not start: {error}"),
@@ -193,10 +219,14 @@ fn count(file: &Path, size: u32, backend: Backend, topology: &str) -> Result<u64
     count.filter(|&count| count > 0).ok_or_else(|| format!("valgrind counted nothing:\n{said}").into())
 }
 
+/// The weights of a file.
+fn weights(file: &Path) -> io::Result<Vec<i16>> {
+    Ok(fs::read(file)?.as_chunks().0.iter().map(|&chunk| i16::from_le_bytes(chunk)).collect())
+}
+
 /// What runs under callgrind: meshes a file twice, to be counted the second time.
 fn mesh(file: &Path, size: &str, backend: &str, topology: Topology) -> Result<(), Box<dyn Error>> {
-    let bytes = fs::read(file)?;
-    let weights: Vec<i16> = bytes.as_chunks().0.iter().map(|&chunk| i16::from_le_bytes(chunk)).collect();
+    let weights = weights(file)?;
     let samples = Samples::new(Shape::cube(size.parse()?)?, &weights)?.padded();
     let backend = BACKENDS.into_iter().find(|known| known.name() == backend).ok_or("no such backend")?;
     if !backend.is_available() {
@@ -213,6 +243,51 @@ fn mesh(file: &Path, size: &str, backend: &str, topology: Topology) -> Result<()
 #[inline(never)]
 fn mesh_and_count(mesher: &mut Mesher, samples: Samples<'_, i16>, settings: &MeshSettings, mesh: &mut MeshBuffer) {
     mesher.mesh(samples, settings, mesh).expect("it went well the first time");
+}
+
+/// What runs under callgrind: does something with the bits of a file twice, to be counted the second time.
+fn operate(file: &Path, size: &str, operation: &str) -> Result<(), Box<dyn Error>> {
+    if Backend::fastest() != Backend::Avx2 {
+        return Err("valgrind shows other instructions than AVX2".into());
+    }
+    let weights = weights(file)?;
+    let grid = BitGrid::from_samples(Samples::new(Shape::cube(size.parse()?)?, &weights)?, 0.0)?;
+    let components = grid.components(Connectivity::Six);
+    let largest = components.largest().and_then(|index| components.get(index)).ok_or("there is nothing")?;
+    let mut bits = Bits { out: grid.shifted([1, 2, 3]), grid, masks: Vec::new(), seed: largest.first };
+    bits.operate(operation)?;
+    let result = bits_and_count(black_box(&mut bits), operation)?;
+    if black_box(result) == 0 { Err("nothing came out".into()) } else { Ok(()) }
+}
+
+/// Callgrind collects inside of this function alone.
+#[inline(never)]
+fn bits_and_count(bits: &mut Bits, operation: &str) -> Result<usize, BitsError> {
+    bits.operate(operation)
+}
+
+/// What operations read and write.
+struct Bits {
+    grid: BitGrid,
+    out: BitGrid,
+    masks: Vec<u8>,
+    seed: [u32; 3],
+}
+
+impl Bits {
+    /// Something of what came out.
+    fn operate(&mut self, operation: &str) -> Result<usize, BitsError> {
+        match operation {
+            "case-masks" => self.grid.case_masks_into(&mut self.masks)?,
+            "shift" => self.grid.shift_into([1, 2, 3], &mut self.out)?,
+            "and" => self.out.and_with(&self.grid)?,
+            "dilation" => self.grid.dilate_into(Connectivity::Six, &mut self.out)?,
+            "flood" => self.out = self.grid.flood(&[self.seed], Connectivity::Six)?,
+            "components" => return Ok(self.grid.components(Connectivity::Six).len()),
+            _ => return Ok(0),
+        }
+        Ok(self.masks.len() + self.out.words().len())
+    }
 }
 
 /// The compiler's version and target, in one line.
