@@ -1,7 +1,11 @@
-//! What the fuzz targets share: volumes made from a fuzzer's bytes, and meshes down to the last bit.
+//! What the fuzz targets share: volumes made from a fuzzer's bytes, and meshes down to the last bit; plain grids of bits.
+
+mod plain;
 
 use libfuzzer_sys::arbitrary::{Arbitrary, Result, Unstructured};
 use marchless::{MeshBuffer, MeshSettings, Samples, Shape, Topology, Weight};
+
+pub use plain::{Plain, neighbours};
 
 /// Every volume is meshed with both.
 pub const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];

@@ -1,6 +1,6 @@
 //! What a grid has in common with boxes, balls and other grids.
 
-use super::{BitGrid, runs::span_words};
+use super::{BitGrid, paste::word_at, runs::span_words};
 use crate::{lattice::Region, math::sqrt_f64};
 
 impl BitGrid {
@@ -73,7 +73,7 @@ impl BitGrid {
             (oy.max(0)..ny.min(my + oy)).any(|y| {
                 let own = self.row(y as u32, z as u32);
                 let others = other.row((y - oy) as u32, (z - oz) as u32);
-                words.clone().any(|index| own[index as usize] & bits_from(others, 64 * index - ox) != 0)
+                words.clone().any(|index| own[index as usize] & word_at(others, 64 * index - ox) != 0)
             })
         })
     }
@@ -97,12 +97,4 @@ impl BitGrid {
 /// The rows of a box.
 fn rows(y: [u32; 2], z: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     (z[0]..z[1]).flat_map(move |z| (y[0]..y[1]).map(move |y| [y, z]))
-}
-
-/// The 64 bits of a row from `start` on, zeros before and behind it.
-fn bits_from(row: &[u64], start: i64) -> u64 {
-    let (index, shift) = (start.div_euclid(64), start.rem_euclid(64));
-    let word = |index: i64| usize::try_from(index).ok().and_then(|index| row.get(index)).copied().unwrap_or(0);
-    // In two steps, since a shift by 64 is none.
-    word(index) >> shift | word(index + 1) << 1 << (63 - shift)
 }
