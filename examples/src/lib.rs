@@ -3,12 +3,14 @@
 
 pub mod camera;
 pub mod files;
+pub mod glb;
 pub mod graphics;
 pub mod ground;
 pub mod look;
 pub mod picture;
 pub mod sky;
 pub mod small;
+pub mod solid;
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -1,9 +1,11 @@
-//! What `sculpt` and `ambiguous_cells` say and return: bad input gets one clear sentence and code 2, `sculpt`'s headless
-//! run makes a mesh without defects, and `ambiguous_cells` prints its figures.
+//! What `sculpt`, `ambiguous_cells` and `cellular_caves` say and return: bad input gets one clear sentence and code 2,
+//! headless runs make meshes without defects, and `ambiguous_cells` prints its figures. And that the pictures of the page
+//! on grids of bits are of its own functions.
 
 mod common;
 
 use std::fs;
+use std::path::Path;
 use std::process::Output;
 
 use bevy_marchless::marchless::MeshReport;
@@ -171,5 +173,72 @@ fn the_topologies_of_a_cell_with_a_tunnel_differ() {
     ] {
         let line = said.lines().find(|line| line.starts_with(view)).unwrap_or_default();
         assert!(line.contains(topology), "{said}");
+    }
+}
+
+#[test]
+fn bad_caves_are_refused() {
+    let refused = |args: &[&str], because| assert_refused_by("cellular_caves", args, because);
+    for flag in ["--fill", "--cut"] {
+        for share in ["", "2", "NaN", "-0.1", "half"] {
+            refused(&[&format!("{flag}={share}")], "a number from 0 to 1");
+        }
+    }
+    refused(&["--birth", "28"], "0..=27");
+    refused(&["--survival=-1"], "0..=27");
+    refused(&["--steps", "31"], "0..=30");
+    for edge in ["15", "257"] {
+        refused(&["--edge", edge], "16..=256");
+    }
+    refused(&["--size", "640,360"], "--screenshot");
+    refused(&["--headless", "--out", "missing_folder/a.glb"], "no folder missing_folder");
+    refused(&["--screenshot", "a.jpg"], ".png");
+}
+
+#[test]
+fn without_a_display_caves_grow_the_same_from_the_same_seed() {
+    let grow = |seed: &str, file: &str| {
+        let path = folder_of_tests().join(file);
+        let _ = fs::remove_file(&path);
+        let output = run("cellular_caves", &["--edge", "33", "--cut", "0", "--caves", "--seed", seed, "--out", file]);
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{}:\n{said}{}", output.status, String::from_utf8_lossy(&output.stderr));
+        assert!(said.contains("this is the headless run"), "{said}");
+        // All but the largest cave are filled.
+        assert!(said.contains("mesh: closed, clean") && said.contains(" triangles, 1 component,"), "{said}");
+        fs::read(path).expect("the mesh was written")
+    };
+    let caves = grow("3", "caves_3.glb");
+    assert!(caves == grow("3", "caves_3_again.glb"), "the same seed makes other caves");
+    assert!(caves != grow("4", "caves_4.glb"), "another seed makes the same caves");
+}
+
+/// Where nothing survives there is no rock to see, and where nothing dies no cave.
+#[test]
+fn caves_may_be_all_or_nothing() {
+    let air = |args: &[&str]| {
+        let args = [&["--headless", "--edge", "16", "--out", "nothing.glb"], args].concat();
+        let output = run("cellular_caves", &args);
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{}:\n{said}{}", output.status, String::from_utf8_lossy(&output.stderr));
+        said.lines().find(|line| line.starts_with("air: ")).expect("the share of air").to_owned()
+    };
+    assert_eq!(air(&["--birth", "27", "--survival", "27"]), "air: 100.00 %, of which 100.00 % are the largest cave");
+    assert_eq!(air(&["--birth", "0"]), "air: 0.00 %, of which 0.00 % are the largest cave");
+    assert_eq!(air(&["--fill", "1", "--survival", "0"]), "air: 0.00 %, of which 0.00 % are the largest cave");
+}
+
+/// What stands before `fn main` in the page's programs, but for `use`, stands in the same words in `bits_pictures`.
+#[test]
+fn the_pictures_of_bits_are_of_the_page_s_functions() {
+    let read = |path: &str| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("it is there");
+    let page = read("../crates/marchless/docs/bits.md");
+    let drawn = read("examples/bits_pictures/snippets.rs").replace("pub(crate) fn ", "fn ");
+    let programs: Vec<&str> = page.split("```rust\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert_eq!(programs.len(), 5);
+    for program in programs {
+        let (functions, _) = program.split_once("fn main()").expect("a program");
+        let (_, functions) = functions.split_once("\n\n").expect("`use` lines come first");
+        assert!(drawn.contains(functions.trim_end()), "these are not in snippets.rs:\n{functions}");
     }
 }

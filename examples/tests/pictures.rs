@@ -81,6 +81,30 @@ fn cells_with_a_tunnel_look_different_in_both_topologies() {
 }
 
 #[test]
+fn a_block_cut_open_shows_caves() {
+    // Caves' walls are yellow above, red in the middle, blue below; without caves there is nothing but rock.
+    let colors = |name: &str, flags: &[&str]| {
+        let path = picture_path(name);
+        let flags = [&["--size", SIZE, "--edge", "48"], flags].concat();
+        render(example("cellular_caves").args(flags).arg("--screenshot").arg(&path))?;
+        let picture = Picture::read(&path);
+        let share = |matches: fn([u8; 3]) -> bool| {
+            picture.pixels.iter().filter(|&&pixel| matches(pixel)).count() as f64 / picture.pixels.len() as f64
+        };
+        let rock = share(|[red, green, blue]| red > 60 && red > green && green > blue);
+        // More blue than green: in no rock, in all walls below the upper third. The background is darker.
+        let walls = share(|[red, green, blue]| red > 45 && blue > green.saturating_add(8));
+        Some((rock, walls))
+    };
+    let Some((rock, walls)) = colors("caves", &[]) else { return };
+    assert!(rock > 0.2 && walls > 0.01, "rock is {:.1} %, walls are {:.1} %", 100.0 * rock, 100.0 * walls);
+    let Some((rock, walls)) = colors("caves_none", &["--fill", "1"]) else { return };
+    assert!(rock > 0.25 && walls < 0.001, "rock is {:.1} %, walls are {:.1} %", 100.0 * rock, 100.0 * walls);
+    let Some((_, bodies)) = colors("caves_bodies", &["--caves"]) else { return };
+    assert!(bodies > 0.05, "bodies are {:.1} %", 100.0 * bodies);
+}
+
+#[test]
 fn a_window_opens_and_shows_something() {
     let folder = folder_of_tests().join(format!("screen_{}", std::process::id()));
     fs::create_dir_all(&folder).expect("the folder of tests can be written");

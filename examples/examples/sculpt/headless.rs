@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use bevy::prelude::*;
 use bevy_marchless::marchless::MeshReport;
 use bevy_marchless::prelude::*;
+use marchless_examples::glb::{self, Mesh};
 
-use crate::glb::{self, Mesh};
 use crate::world::{Kind, World};
 
 /// How long a step may take before something must be wrong.

@@ -9,7 +9,6 @@
 
 mod args;
 mod brush;
-mod glb;
 mod headless;
 mod panel;
 mod picture;

@@ -4,30 +4,30 @@ use std::borrow::Cow;
 use std::io::{self, Write as _};
 use std::path::Path;
 
+use crate::files::write_atomically;
 use gltf_json as json;
 use json::accessor::{ComponentType, GenericComponentType, Type};
 use json::validation::Checked::Valid;
 use json::validation::USize64;
-use marchless_examples::files::write_atomically;
 
 /// An indexed mesh with a normal and a linear colour per vertex.
 #[derive(Debug, Default)]
-pub(crate) struct Mesh {
+pub struct Mesh {
     /// [Units: metres]
-    pub(crate) positions: Vec<[f32; 3]>,
+    pub positions: Vec<[f32; 3]>,
     /// Of unit length.
-    pub(crate) normals: Vec<[f32; 3]>,
+    pub normals: Vec<[f32; 3]>,
     /// Red, green, blue and alpha.
-    pub(crate) colors: Vec<[u8; 4]>,
+    pub colors: Vec<[u8; 4]>,
     /// Three a triangle.
-    pub(crate) indices: Vec<u32>,
+    pub indices: Vec<u32>,
 }
 
 /// Writes `mesh` to a file; an old one is replaced only by a whole new one.
 ///
 /// # Errors
 /// What the system says.
-pub(crate) fn write(path: &Path, mesh: &Mesh) -> io::Result<()> {
+pub fn write(path: &Path, mesh: &Mesh) -> io::Result<()> {
     let mut file = Builder::default();
     let (positions, min, max) = (flat(&mesh.positions), bound(mesh, f32::min), bound(mesh, f32::max));
     let position = file.push(&positions, mesh.positions.len(), ComponentType::F32, Type::Vec3);
@@ -108,7 +108,7 @@ impl Builder {
             extensions: None,
             extras: json::Extras::default(),
         });
-        let name = Some("terrain".to_owned());
+        let name = Some("surface".to_owned());
         let mesh = root.push(json::Mesh {
             primitives: vec![primitive],
             weights: None,
