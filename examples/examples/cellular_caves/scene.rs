@@ -54,7 +54,7 @@ impl Growing {
 }
 
 fn set_up(mut commands: Commands) {
-    let eye = EXTENT * Vec3::new(1.14, 0.92, 1.28);
+    let eye = EXTENT * Vec3::new(1.22, 0.98, 1.36);
     commands.spawn((fly_camera(eye, EXTENT * Vec3::new(0.0, -0.11, 0.0)), Tonemapping::AcesFitted)).with_child((
         // A lamp in the hand.
         PointLight { intensity: 4.0e6, range: 60.0, color: Color::srgb(1.0, 0.86, 0.68), ..default() },
