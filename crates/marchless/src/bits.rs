@@ -1,4 +1,12 @@
 //! A three-dimensional grid of bits, and operations on all of it that cost a few word operations a row.
+//!
+//! [caves]: ../../../../crates/marchless/docs/pictures/caves.png
+//! [water]: ../../../../crates/marchless/docs/pictures/water.png
+//! [erosion]: ../../../../crates/marchless/docs/pictures/erosion.png
+//! [collision]: ../../../../crates/marchless/docs/pictures/collision.png
+//! [floating]: ../../../../crates/marchless/docs/pictures/floating.png
+//!
+#![doc = include_str!("../docs/bits.md")]
 
 mod automaton;
 mod case_masks;
