@@ -27,15 +27,18 @@ pub(crate) struct Args {
     fill: f32,
 
     /// How many of its 26 neighbours must be rock for air to turn to rock; 27 is never.
-    #[arg(long, value_name = "N", default_value_t = Settings::default().birth, value_parser = clap::value_parser!(u8).range(..=27))]
+    #[arg(long, value_name = "N", default_value_t = Settings::default().birth,
+        value_parser = clap::value_parser!(u8).range(..=27))]
     birth: u8,
 
     /// How many of its 26 neighbours must be rock for rock to stay rock; 27 is never.
-    #[arg(long, value_name = "N", default_value_t = Settings::default().survival, value_parser = clap::value_parser!(u8).range(..=27))]
+    #[arg(long, value_name = "N", default_value_t = Settings::default().survival,
+        value_parser = clap::value_parser!(u8).range(..=27))]
     survival: u8,
 
     /// How many steps the automaton takes.
-    #[arg(long, value_name = "N", default_value_t = Settings::default().steps, value_parser = clap::value_parser!(u8).range(..=30))]
+    #[arg(long, value_name = "N", default_value_t = Settings::default().steps,
+        value_parser = clap::value_parser!(u8).range(..=30))]
     steps: u8,
 
     /// How far the block is cut open, from 0 to 1.

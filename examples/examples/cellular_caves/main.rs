@@ -2,14 +2,14 @@
 //!
 //! Every point of the block begins as rock or air by chance. In each step a point turns to rock where enough of its 26
 //! neighbours are rock, and stays rock where enough of them are. Then all air that is not connected to the largest cave
-//! is filled, and what is left is meshed. Sliders change all of it; growing runs beside the drawing. Cut faces are light,
-//! caves the bluer the deeper; V shows the largest cave as a body instead.
+//! is filled, and what is left is meshed. Sliders change all of it; growing runs beside the drawing. Cut faces are
+//! light, caves the bluer the deeper; V shows the largest cave as a body instead.
 //!
 //! Click beside the panel to grab the mouse, Esc frees it. W, A, S, D, Space and Shift fly, Ctrl flies faster. R takes
 //! another seed, V turns rock into caves and back.
 //!
-//! `--screenshot` renders a picture without a window; `--headless`, or no display, prints the figures, checks the mesh and
-//! writes it. See `--help`.
+//! `--screenshot` renders a picture without a window; `--headless`, or no display, prints the figures, checks the mesh
+//! and writes it. See `--help`.
 
 mod args;
 mod caves;

@@ -63,6 +63,6 @@ fn show_sliders(ui: &mut egui::Ui, settings: &mut Settings) {
     ui.add(egui::Slider::new(&mut settings.cut, 0.0..=1.0).step_by(0.01).text("cut open"));
     ui.horizontal(|ui| {
         ui.selectable_value(&mut settings.view, View::Rock, "rock");
-        ui.selectable_value(&mut settings.view, View::Caves, "caves as bodies");
+        ui.selectable_value(&mut settings.view, View::Caves, "largest cave");
     });
 }
