@@ -1,6 +1,6 @@
-//! What `sculpt`, `ambiguous_cells` and `cellular_caves` say and return: bad input gets one clear sentence and code 2,
-//! headless runs make meshes without defects, and `ambiguous_cells` prints its figures. And that the pictures of the page
-//! on grids of bits are of its own functions.
+//! What `sculpt`, `ambiguous_cells`, `cellular_caves` and `falling_pieces` say and return: bad input gets one clear
+//! sentence and code 2, the headless runs make meshes without defects, `ambiguous_cells` prints its figures, and what
+//! `falling_pieces` cuts loose comes to rest.
 
 mod common;
 
@@ -241,4 +241,31 @@ fn the_pictures_of_bits_are_of_the_page_s_functions() {
         let (_, functions) = functions.split_once("\n\n").expect("`use` lines come first");
         assert!(drawn.contains(functions.trim_end()), "these are not in snippets.rs:\n{functions}");
     }
+}
+
+#[test]
+fn falling_pieces_refuses_what_it_does_not_know() {
+    let refused = |args: &[&str], because| assert_refused_by("falling_pieces", args, because);
+    refused(&["--screenshot", "a.png", "--moment", "never"], "before, falling, rest");
+    refused(&["--moment", "rest"], "--screenshot");
+    refused(&["--headless", "--screenshot", "a.png"], "--headless");
+    refused(&["--screenshot", "a.jpg"], ".png");
+    refused(&["--screenshot", "missing_folder/a.png"], "no folder missing_folder");
+}
+
+#[test]
+fn without_a_display_a_piece_falls_and_comes_to_rest() {
+    let output = run("falling_pieces", &[]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}:\n{said}{}", output.status, String::from_utf8_lossy(&output.stderr));
+    assert!(said.contains("this is the headless run"), "{said}");
+    let number = |line: &str, before: &str| -> Option<u32> {
+        let (_, rest) = said.lines().find(|said| said.contains(line))?.split_once(before)?;
+        rest.split(' ').next()?.parse().ok()
+    };
+    let [free, at_rest] = ["hangs free", "is at rest"].map(|line| number(line, "piece of "));
+    assert!(free.is_some_and(|volume| volume > 5_000) && free == at_rest, "{said}");
+    // As far as the gap is high.
+    let steps = number("is at rest", "at rest, ");
+    assert!(steps.is_some_and(|steps| (4..=20).contains(&steps)), "{said}");
 }

@@ -62,6 +62,29 @@ fn quickstart_shows_hills() {
 }
 
 #[test]
+fn what_hangs_free_falls_and_comes_to_rest() {
+    let picture = |moment: &str| {
+        let path = picture_path(&format!("falling_pieces_{moment}"));
+        let mut command = example("falling_pieces");
+        render(command.args(["--size", SIZE, "--moment", moment]).arg("--screenshot").arg(&path))?;
+        Some(Picture::read(&path))
+    };
+    let moments = ["before", "falling", "rest"].map(picture);
+    let [Some(before), Some(falling), Some(rest)] = moments else { return };
+    // The mushroom's cap is all that is red. It moves down, and looks the same.
+    let caps = [&before, &falling, &rest].map(|picture| {
+        picture.assert_is_a_landscape();
+        let is_red = |[red, green, _]: [u8; 3]| u32::from(red) * 10 > u32::from(green) * 14 && red > 60;
+        let rows = picture.pixels.iter().enumerate().filter(|(_, pixel)| is_red(**pixel));
+        let rows: Vec<_> = rows.map(|(index, _)| (index / picture.width) as f64).collect();
+        (rows.len() as f64, rows.iter().sum::<f64>() / rows.len().max(1) as f64)
+    });
+    let [(size, start), (_, middle), (_, end)] = caps;
+    assert!(size > 1_000.0 && caps.iter().all(|(other, _)| (other / size - 1.0).abs() < 0.2), "{caps:?}");
+    assert!(start + 5.0 < middle && middle + 5.0 < end && end < start + 60.0, "{caps:?}");
+}
+
+#[test]
 fn cells_that_are_not_ambiguous_look_alike_in_both_topologies() {
     // A single corner.
     let Some(picture) = cell("cell_single_corner", "0.8,1,0.5,0.8,0.5,0.8,-0.6,0.5") else { return };

@@ -13,7 +13,8 @@ use marchless::bits::{BitGrid, BitsError};
 use thiserror::Error;
 
 use crate::brush::TerrainEdited;
-use crate::terrain::TerrainVolume;
+use crate::mesh::ChunkSamples;
+use crate::terrain::{Terrain, TerrainVolume};
 pub(crate) use cache::BitsCache;
 use part::{Part, parts, within};
 pub use piece::Piece;
@@ -161,6 +162,17 @@ impl TerrainBits<'_, '_> {
         self.snapshot(edited.terrain, region)?.loose_pieces()
     }
 
+    /// The samples of a piece alone, as they are now: put them on an entity, and it looks as it did in the terrain. The lowest
+    /// sample lies at two points below the piece's bounds, since there is air all around. Takes milliseconds for
+    /// bounds of 64³ points.
+    ///
+    /// # Errors
+    /// [`TerrainBitsError::NoTerrain`].
+    pub fn samples(&self, terrain: Entity, piece: &Piece) -> Result<ChunkSamples, TerrainBitsError> {
+        let (volume, settings) = self.accepted(terrain)?;
+        Ok(piece.samples(volume, settings))
+    }
+
     /// A box as it is now, to be asked [in a task](BitsSnapshot::in_task). Takes a fraction of a microsecond a chunk.
     ///
     /// # Errors
@@ -188,9 +200,15 @@ impl TerrainBits<'_, '_> {
 
     /// The terrain's samples, and the isovalue in effect.
     fn volume(&self, terrain: Entity) -> Result<(&TerrainVolume, f32), TerrainBitsError> {
+        let (volume, settings) = self.accepted(terrain)?;
+        Ok((volume, settings.isovalue))
+    }
+
+    /// The terrain's samples and the settings in effect.
+    fn accepted(&self, terrain: Entity) -> Result<(&TerrainVolume, &Terrain), TerrainBitsError> {
         let volume = self.terrains.get(terrain).ok();
-        let with_isovalue = volume.and_then(|volume| Some((volume, volume.settings()?.isovalue)));
-        with_isovalue.ok_or(TerrainBitsError::NoTerrain { entity: terrain })
+        let with_settings = volume.and_then(|volume| Some((volume, volume.settings()?)));
+        with_settings.ok_or(TerrainBitsError::NoTerrain { entity: terrain })
     }
 }
 

@@ -327,6 +327,15 @@ fn a_head_hangs_free_once_its_pillar_is_cut_and_can_be_dug_out() {
     let pieces = ask(&mut app, move |bits| bits.pieces(terrain, small)).unwrap();
     assert!(pieces.iter().all(Piece::is_held), "{pieces:?}");
 
+    let piece = head.clone();
+    let samples = ask(&mut app, move |bits| bits.samples(terrain, &piece)).expect("a terrain");
+    let (lowest, shape) = (min.map(|v| v - 2), samples.shape().as_ivec3().to_array());
+    assert_eq!(shape, [0, 1, 2].map(|axis| head.bounds().max[axis] + 2 - lowest[axis]));
+    for (index, point) in Region::new(lowest, [0, 1, 2].map(|axis| lowest[axis] + shape[axis])).points().enumerate() {
+        assert_eq!(samples.weights()[index] < 0, expected.contains(&point), "{point:?}");
+    }
+    let body = app.world_mut().spawn(samples).id();
+
     for stamp in head.stamps(terrain, 0.0) {
         app.world_mut().write_message(stamp);
     }
@@ -334,6 +343,10 @@ fn a_head_hangs_free_once_its_pillar_is_cut_and_can_be_dug_out() {
     let left = Oracle::new(&app, terrain).0;
     assert_eq!(left, oracle.0.difference(&expected).copied().collect());
     assert_drawn(&mut app, terrain);
+    // The body shows in the update in which the terrain loses it.
+    let mesh = &app.world().get::<ChunkGeometry>(body).unwrap().mesh;
+    let report = marchless::MeshReport::new(&mesh.positions, &mesh.indices);
+    assert!(report.triangles > 500 && report.components == 1 && report.is_closed() && report.is_clean(), "{report}");
 }
 
 #[test]

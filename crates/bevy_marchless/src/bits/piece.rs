@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
 use bevy_math::IVec3;
-use marchless::Region;
 use marchless::bits::{BitGrid, Component, Connectivity};
+use marchless::{Region, Voxel, Weight as _};
 
 use crate::brush::{BrushShape, Stamp};
+use crate::mesh::ChunkSamples;
+use crate::terrain::{Terrain, TerrainVolume};
 
 /// A part of what is solid in a box of a terrain that hangs together, as it was when it was found.
 #[derive(Clone)]
@@ -71,6 +73,31 @@ impl Piece {
         self.solid.cut(Region::new(min, max)).expect("the box in which it was found is larger")
     }
 
+    /// Its samples as they are in the terrain now, with two points of air on each side.
+    pub(super) fn samples(&self, volume: &TerrainVolume, settings: &Terrain) -> ChunkSamples {
+        let (own, region, isovalue) = (self.bits(), self.bounds.grown(RIM, RIM), settings.isovalue);
+        let is_own = |point: [i32; 3]| {
+            let place = [0, 1, 2].map(|axis| u32::try_from(point[axis] - self.bounds.min[axis]).unwrap_or(u32::MAX));
+            own.get(place)
+        };
+        let voxel = |point| {
+            let voxel = volume.grid.get(point);
+            let weight = voxel.weight.to_voxels();
+            if weight >= isovalue || is_own(point) {
+                return voxel;
+            }
+            // Of another piece: as far outside as it is inside.
+            Voxel { weight: i16::from_voxels((2.0 * isovalue - weight).max(isovalue + 1.0 / 256.0)), ..voxel }
+        };
+        let (weights, materials) = region.points().map(voxel).map(|voxel| (voxel.weight, voxel.material)).unzip();
+        let samples =
+            ChunkSamples::new(region.size().into(), weights).and_then(|samples| samples.with_materials(materials));
+        let mut samples = samples.expect("a voxel for each point, and several per axis");
+        (samples.isovalue, samples.normals) = (isovalue, settings.normals);
+        samples.palette = settings.palette.clone();
+        samples
+    }
+
     /// Stamps that dig it out of `terrain`, and nothing else: all its points become air, and no other point changes sides.
     /// Surfaces less than half a voxel away may move a little.
     ///
@@ -105,6 +132,8 @@ impl Piece {
     }
 }
 
+/// How many points of air a piece's samples have on each side: one for the surface, one for its normals.
+const RIM: u32 = 2;
 /// The longest box that one stamp digs. [Units: voxels]
 const LONGEST_BOX: u32 = 2000;
 
