@@ -25,14 +25,12 @@ mod samples;
 mod shift;
 mod tile;
 
-use alloc::{vec, vec::Vec};
-
 use thiserror::Error;
 
 use crate::{
     lattice::{Region, Samples, Shape},
     sample::Weight,
-    simd::Backend,
+    simd::{Backend, Words},
 };
 pub use automaton::Rule;
 pub use components::{Component, Components};
@@ -60,7 +58,7 @@ pub struct BitGrid {
     shape: Shape,
     /// Words a row.
     row: usize,
-    words: Vec<u64>,
+    words: Words,
 }
 
 impl BitGrid {
@@ -76,7 +74,7 @@ impl BitGrid {
     pub(crate) fn empty(shape: Shape) -> Self {
         let [nx, ny, nz] = shape.size().map(|size| size as usize);
         let row = nx.div_ceil(64);
-        Self { shape, row, words: vec![0; row * ny * nz] }
+        Self { shape, row, words: Words::zeros(row * ny * nz) }
     }
 
     /// A grid of bits that all have this value.
@@ -88,11 +86,10 @@ impl BitGrid {
         let row = nx.div_ceil(64);
         let too_large = BitsError::TooLarge { shape };
         let len = ny.checked_mul(nz).and_then(|rows| rows.checked_mul(row)).ok_or(too_large)?;
-        let mut words = Vec::new();
-        words.try_reserve_exact(len).map_err(|_| too_large)?;
-        words.resize(len, if value { u64::MAX } else { 0 });
+        let words = Words::try_zeros(len).map_err(|_| too_large)?;
         let mut grid = Self { shape, row, words };
         if value {
+            grid.words.fill(u64::MAX);
             grid.clear_unused();
         }
         Ok(grid)

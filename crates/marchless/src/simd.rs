@@ -18,6 +18,7 @@ use core::mem::MaybeUninit;
 use crate::cell::Face;
 
 mod portable;
+mod words;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -25,6 +26,8 @@ mod avx2;
 mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod sse2;
+
+pub(crate) use words::Words;
 
 /// Which instructions meshing uses. The meshes are the same, bit for bit, whichever it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

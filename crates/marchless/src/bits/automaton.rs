@@ -6,6 +6,7 @@
 //! which every node chooses between two earlier ones, a word at a time.
 
 use alloc::{vec, vec::Vec};
+use core::ops::Range;
 
 use super::{
     BitGrid, BitsError, Connectivity,
@@ -189,21 +190,17 @@ impl Sums {
         let (ends, outside) = (&self.ends, self.outside);
         let [low, high] = &self.along_z;
         let rows = self.row..self.row + slab;
-        let square = |sums: &mut [Vec<u64>; 4]| {
-            let [a, b, c, d] = sums.each_mut().map(|plane| &mut plane[rows.clone()]);
-            square(low, high, ends, outside, [a, b, c, d]);
-        };
         match self.connectivity {
-            Connectivity::TwentySix => square(&mut self.sides),
+            Connectivity::TwentySix => square(low, high, ends, outside, parts(&mut self.sides, rows)),
             Connectivity::Eighteen => {
-                square(&mut self.centre);
+                square(low, high, ends, outside, parts(&mut self.centre, rows.clone()));
                 self.here[1..=slab].copy_from_slice(here);
-                let [a, b, c, _] = self.sides.each_mut().map(|plane| &mut plane[rows.clone()]);
+                let [a, b, c, _] = parts(&mut self.sides, rows);
                 cross(low, high, &self.here, ends, outside, [a, b, c]);
             }
             Connectivity::Six => {
                 self.here[1..=slab].copy_from_slice(here);
-                let [a, b, c, _] = self.centre.each_mut().map(|plane| &mut plane[rows.clone()]);
+                let [a, b, c, _] = parts(&mut self.centre, rows.clone());
                 cross(low, high, &self.here, ends, outside, [a, b, c]);
                 self.sides[0][rows].copy_from_slice(here);
             }
@@ -217,23 +214,39 @@ impl Sums {
     /// The bits of the counts of a block, the point itself included, and those of the points.
     #[inline(always)]
     fn counts(&self, at: usize) -> [[u64; BLOCK]; 6] {
-        let block =
-            |plane: &[u64], at: usize| -> [u64; BLOCK] { plane[at..].first_chunk().copied().unwrap_or([0; BLOCK]) };
         let centre = if self.connectivity == Connectivity::TwentySix { &self.sides } else { &self.centre };
-        let centre = centre.each_ref().map(|plane| block(plane, at + self.row));
-        let below = self.sides.each_ref().map(|plane| block(plane, at));
-        let above = self.sides.each_ref().map(|plane| block(plane, at + 2 * self.row));
+        let (centre, below) = (blocks(centre, at + self.row), blocks(&self.sides, at));
+        let above = blocks(&self.sides, at + 2 * self.row);
         let mut bits = [[0; BLOCK]; 6];
         for k in 0..BLOCK {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|bit| full([below[bit][k], centre[bit][k], above[bit][k]]));
+            let three = |bit: usize| full([below[bit][k], centre[bit][k], above[bit][k]]);
+            let (a, b, c, d) = (three(0), three(1), three(2), three(3));
             let (second, carry) = (b[0] ^ a[1], b[0] & a[1]);
             let [third, carry] = full([c[0], b[1], carry]);
             let [fourth, carry] = full([d[0], c[1], carry]);
             (bits[0][k], bits[1][k], bits[2][k], bits[3][k], bits[4][k]) = (a[0], second, third, fourth, d[1] | carry);
         }
-        bits[5] = block(&self.here, at + 1);
+        bits[5] = *block(&self.here, at + 1);
         bits
     }
+}
+
+/// A block of all planes.
+#[inline(always)]
+fn blocks([a, b, c, d]: &[Vec<u64>; 4], at: usize) -> [&[u64; BLOCK]; 4] {
+    [block(a, at), block(b, at), block(c, at), block(d, at)]
+}
+
+#[inline(always)]
+fn block(plane: &[u64], at: usize) -> &[u64; BLOCK] {
+    plane[at..].first_chunk().expect("planes go on for a block behind their last row")
+}
+
+/// The same words of all planes.
+#[inline(always)]
+fn parts(planes: &mut [Vec<u64>; 4], words: Range<usize>) -> [&mut [u64]; 4] {
+    let [a, b, c, d] = planes;
+    [&mut a[words.clone()], &mut b[words.clone()], &mut c[words.clone()], &mut d[words]]
 }
 
 /// Adds three bits: the sum's low bit and its high one.

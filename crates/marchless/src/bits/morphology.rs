@@ -1,12 +1,12 @@
 //! Dilation, erosion, opening, closing.
 //!
-//! Slab by slab, each from the lowest y to the highest, a row or a few short ones at once: what is joined along z stays
+//! Two slabs at a time, from the lowest y to the highest, a row or a few short ones at once: what is joined along z stays
 //! in registers for two steps, until it has been joined along y, and at once along x.
 
 use core::array::from_fn;
 
 use super::{BitGrid, BitsError, Connectivity, pattern::Pattern};
-use crate::simd::{Backend, Eight, Job, Simd, dispatch};
+use crate::simd::{Backend, Eight, Job, Simd, Words, dispatch};
 
 impl BitGrid {
     /// The points that are set or have a neighbour that is. Points outside are not set.
@@ -149,49 +149,64 @@ impl Strip {
         from: &BitGrid,
         out: &mut BitGrid,
     ) {
-        let slab = from.row * from.shape.size()[1] as usize;
-        let slabs = from.words.chunks_exact(slab);
-        let below = slabs.clone().take(1).chain(slabs.clone());
-        let above = slabs.clone().skip(1).chain(slabs.clone().next_back());
-        for (((out, here), below), above) in out.words.chunks_exact_mut(slab).zip(slabs).zip(below).zip(above) {
-            self.slab::<S, ROW, ERODE, NEIGHBOURS>([below, here, above], out);
+        let [_, ny, nz] = from.shape.size().map(|size| size as usize);
+        let len = from.row * ny;
+        // Beyond the lowest and the highest slab, these stand for those that are missing.
+        let slab = |z: usize| &from.words[len * z.min(nz - 1)..][..len];
+        if nz == 1 {
+            let mut spare = Words::zeros(len);
+            self.two_slabs::<S, ROW, ERODE, NEIGHBOURS>([slab(0); 4], [&mut out.words, &mut spare]);
+            return;
+        }
+        for z in (1..nz + nz % 2).step_by(2) {
+            // Of an odd number, the last but one is made twice.
+            let z = z.min(nz - 1);
+            let (low, high) = out.words[len * (z - 1)..][..2 * len].split_at_mut(len);
+            let slabs = [slab(z.saturating_sub(2)), slab(z - 1), slab(z), slab(z + 1)];
+            self.two_slabs::<S, ROW, ERODE, NEIGHBOURS>(slabs, [low, high]);
         }
     }
 
-    /// Joins the points of a slab with their neighbours in it and in those below and above. `ROW`: how many words a row
+    /// Joins the points of the two slabs in the middle with their neighbours in all four. `ROW`: how many words a row
     /// has, or [`LANES`] where one row at once is treated.
     #[inline(always)]
-    fn slab<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
+    fn two_slabs<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
         &self,
-        slabs: [&[u64]; 3],
-        out: &mut [u64],
+        slabs: [&[u64]; 4],
+        [low, high]: [&mut [u64]; 2],
     ) {
         let masks = [S::Eight::load(&self.from_low), S::Eight::load(&self.from_high)];
         let nothing = S::Eight::load(&[nothing::<ERODE>(); LANES]);
-        let (mut before, mut here) = ([nothing; 2], load_part::<S, ERODE>(slabs, self.start));
+        let (mut before, mut here) = ([[nothing; 2]; 2], load_part::<S, ERODE>(slabs, self.start));
         let mut at = self.start;
         // What is written behind the words of a step is overwritten by the next.
         if at == 0 {
             // Where all that a step reads is there; it has no branches.
-            while let ([Some(below), Some(now), Some(above)], Some(out)) =
-                (slabs.map(|slab| chunk(slab, at + self.step)), out.get_mut(at..).and_then(|out| out.first_chunk_mut()))
-            {
-                let behind = join_slabs::<S, ERODE>([below, now, above]);
-                step::<S, ROW, ERODE, NEIGHBOURS>([before, here, behind], masks).store(out);
+            while let ([Some(below), Some(first), Some(second), Some(above)], Some(low), Some(high)) = (
+                slabs.map(|slab| chunk(slab, at + self.step)),
+                low.get_mut(at..).and_then(|low| low.first_chunk_mut()),
+                high.get_mut(at..).and_then(|high| high.first_chunk_mut()),
+            ) {
+                let behind = join_slabs::<S, ERODE>([below, first, second, above]);
+                for (out, slab) in [low, high].into_iter().zip([0, 1]) {
+                    step::<S, ROW, ERODE, NEIGHBOURS>([before[slab], here[slab], behind[slab]], masks).store(out);
+                }
                 (before, here) = (here, behind);
                 at += self.step;
             }
         }
-        while at < out.len() {
+        while at < low.len() {
             let behind = load_part::<S, ERODE>(slabs, at + self.step);
-            let joined = step::<S, ROW, ERODE, NEIGHBOURS>([before, here, behind], masks);
-            match out[at..].first_chunk_mut() {
-                Some(out) if self.start == 0 => joined.store(out),
-                _ => {
-                    let mut words = [0; LANES];
-                    joined.store(&mut words);
-                    let first = usize::from(self.start > 0);
-                    out[at..].iter_mut().zip(words).skip(first).for_each(|(out, word)| *out = word);
+            for (out, slab) in [&mut *low, &mut *high].into_iter().zip([0, 1]) {
+                let joined = step::<S, ROW, ERODE, NEIGHBOURS>([before[slab], here[slab], behind[slab]], masks);
+                match out[at..].first_chunk_mut() {
+                    Some(out) if self.start == 0 => joined.store(out),
+                    _ => {
+                        let mut words = [0; LANES];
+                        joined.store(&mut words);
+                        let first = usize::from(self.start > 0);
+                        out[at..].iter_mut().zip(words).skip(first).for_each(|(out, word)| *out = word);
+                    }
                 }
             }
             (before, here) = (here, behind);
@@ -210,23 +225,21 @@ fn chunk(slab: &[u64], at: usize) -> Option<&[u64; LANES]> {
     slab.get(at..)?.first_chunk()
 }
 
-/// The words of a slab, and those of it, the slab below and the slab above joined.
+/// For both slabs in the middle its words, and those of it, the slab below and the slab above joined.
 #[inline(always)]
-fn join_slabs<S: Simd, const ERODE: bool>([below, here, above]: [&[u64; LANES]; 3]) -> [S::Eight; 2] {
-    let [below, here, above] = [S::Eight::load(below), S::Eight::load(here), S::Eight::load(above)];
-    [here, here.join::<ERODE>(below).join::<ERODE>(above)]
+fn join_slabs<S: Simd, const ERODE: bool>(slabs: [&[u64; LANES]; 4]) -> [[S::Eight; 2]; 2] {
+    let [below, first, second, above] = slabs.map(|words| S::Eight::load(words));
+    let both = first.join::<ERODE>(second);
+    [[first, both.join::<ERODE>(below)], [second, both.join::<ERODE>(above)]]
 }
 
 /// [`join_slabs`] of as many words as there are from `at` on.
 #[inline(always)]
-fn load_part<S: Simd, const ERODE: bool>(slabs: [&[u64]; 3], at: usize) -> [S::Eight; 2] {
-    if let [Some(below), Some(here), Some(above)] = slabs.map(|slab| chunk(slab, at)) {
-        return join_slabs::<S, ERODE>([below, here, above]);
+fn load_part<S: Simd, const ERODE: bool>(slabs: [&[u64]; 4], at: usize) -> [[S::Eight; 2]; 2] {
+    if let [Some(below), Some(first), Some(second), Some(above)] = slabs.map(|slab| chunk(slab, at)) {
+        return join_slabs::<S, ERODE>([below, first, second, above]);
     }
-    let mut words = [[nothing::<ERODE>(); LANES]; 3];
-    if at >= slabs[1].len() {
-        return [S::Eight::load(&words[0]); 2];
-    }
+    let mut words = [[nothing::<ERODE>(); LANES]; 4];
     for (words, slab) in words.iter_mut().zip(slabs) {
         words.iter_mut().zip(slab.iter().skip(at)).for_each(|(word, &there)| *word = there);
     }
@@ -288,6 +301,46 @@ impl Ends {
         Self {
             from_low: Pattern::new(row, rows, 0, |column| valid(column) & if column == 0 { !1 } else { u64::MAX }),
             from_high: Pattern::new(row, rows, 0, |column| if column == row - 1 { last >> 1 } else { u64::MAX }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::Shape;
+
+    fn spread<const ERODE: bool>(backend: Backend, from: &BitGrid, connectivity: Connectivity) -> BitGrid {
+        let mut out = from.zeros();
+        dispatch(backend, Spread::<ERODE> { from, connectivity, out: &mut out });
+        out
+    }
+
+    #[test]
+    fn backends_agree() {
+        for nx in [1, 63, 64, 65, 127, 128, 130, 250, 256, 320, 512, 513, 1000] {
+            for ny in [1, 2, 3, 7, 8, 9] {
+                let noise = |[x, y, z]: [u32; 3]| {
+                    let mixed =
+                        (x ^ y.wrapping_mul(0x9e37_79b9) ^ z.wrapping_mul(0x85eb_ca6b)).wrapping_mul(0x2c1b_3c6d);
+                    (mixed ^ mixed >> 15).wrapping_mul(0x297a_2d39) >> 30 != 0
+                };
+                let dense = BitGrid::from_fn(Shape::new([nx, ny, 1 + (nx + ny) % 4]).unwrap(), noise).unwrap();
+                let mut sparse = dense.clone();
+                sparse.invert();
+                for (backend, connectivity) in Backend::ALL
+                    .iter()
+                    .flat_map(|&backend| Connectivity::ALL.map(|connectivity| (backend, connectivity)))
+                {
+                    let dilated = spread::<false>(backend, &sparse, connectivity);
+                    assert!(
+                        dilated == spread::<false>(Backend::Portable, &sparse, connectivity),
+                        "{backend:?} {nx} {ny}"
+                    );
+                    let eroded = spread::<true>(backend, &dense, connectivity);
+                    assert!(eroded == spread::<true>(Backend::Portable, &dense, connectivity), "{backend:?} {nx} {ny}");
+                }
+            }
         }
     }
 }

@@ -5,7 +5,7 @@
 //! another row.
 
 use super::{BitGrid, BitsError, pattern::Pattern};
-use crate::simd::{Backend, Job, Simd, dispatch};
+use crate::simd::{Backend, Job, Simd, Words, dispatch};
 
 impl BitGrid {
     /// The grid with every set point moved by `offset`: point `p` of it is point `p - offset` of this one. Zeros come in
@@ -39,7 +39,7 @@ impl BitGrid {
 
     /// A grid of zeros of the same shape.
     pub(super) fn zeros(&self) -> Self {
-        Self { shape: self.shape, row: self.row, words: alloc::vec![0; self.words.len()] }
+        Self { shape: self.shape, row: self.row, words: Words::zeros(self.words.len()) }
     }
 }
 

@@ -75,9 +75,9 @@ impl Codes {
     ) {
         let words = lattice.words;
         let last_bit = lattice.last_word ^ lattice.last_word >> 1;
-        let Self { codes, count: gathered, active, open, firsts } = self;
+        let Self { active, open, firsts, .. } = self;
         let cells = words * (lattice.size[1] - 1);
-        *gathered = 0;
+        let mut gathered = 0;
         for start in (0..cells).step_by(WORDS) {
             let count = (cells - start).min(WORDS);
             let [a, b, c, d, e, f, g, h] = corner_words(low, high, start, count, words);
@@ -87,18 +87,20 @@ impl Codes {
                 active[i] = any & !all;
             }
             let ends_row = |i: usize| words == 1 || (start + i + 1).is_multiple_of(words);
-            if codes.len() < *gathered + 64 * count {
-                codes.resize(*gathered + 64 * count, 0);
+            if self.codes.len() < gathered + 64 * count {
+                self.codes.resize(gathered + 64 * count, 0);
             }
+            let codes = &mut self.codes[..];
             let mut nonzero = S::nonzero(filled(active, count));
             while nonzero != 0 {
                 let i = nonzero.trailing_zeros() as usize;
                 nonzero &= nonzero - 1;
-                firsts[i % WORDS] = *gathered;
+                firsts[i % WORDS] = gathered;
                 let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
-                let room = codes[*gathered..].first_chunk_mut().expect("there is room for another word's codes");
-                *gathered += S::cases(corners, active[i % WORDS], room);
-                codes[*gathered - 1] += if ends_row(i) && active[i % WORDS] & last_bit != 0 { CLOSING } else { 0 };
+                let room = codes[gathered..].first_chunk_mut().expect("there is room for another word's codes");
+                let found = S::cases(corners, active[i % WORDS], room);
+                room[(found - 1) % 64] += if ends_row(i) && active[i % WORDS] & last_bit != 0 { CLOSING } else { 0 };
+                gathered += found;
             }
             let Some(open_cells) = &mut open_cells else { continue };
             for i in 0..count {
@@ -119,6 +121,7 @@ impl Codes {
                 }
             }
         }
+        self.count = gathered;
     }
 }
 
