@@ -103,6 +103,13 @@ pub(crate) fn dispatch<J: Job>(backend: Backend, job: J) -> J::Output {
     match backend {
         #[cfg(target_arch = "x86_64")]
         Backend::Sse2 if backend.is_available() => job.run::<sse2::Sse2>(),
+        _ => dispatch_words(backend, job),
+    }
+}
+
+/// [`dispatch`] for loops over words: SSE2 has no instruction of use to them that the compiler does not find.
+pub(crate) fn dispatch_words<J: Job>(backend: Backend, job: J) -> J::Output {
+    match backend {
         #[cfg(target_arch = "x86_64")]
         Backend::Avx2 if backend.is_available() => {
             // SAFETY: the processor has the instructions.
@@ -213,16 +220,16 @@ pub trait Eight: Copy {
     fn load(words: &[u64; 8]) -> Self;
     fn store(self, words: &mut [u64; 8]);
 
-    /// The bits of both where `AND`, those of either where not.
-    fn join<const AND: bool>(self, other: Self) -> Self;
+    fn or(self, other: Self) -> Self;
+    fn xor(self, other: Self) -> Self;
 
     /// The lanes `START` to `START + 7` of two times eight. `START`: 1, 2, 4, 6 or 7.
     fn window<const START: usize>(first: Self, second: Self) -> Self;
 
-    /// Joins each bit with those beside it in `sides`, at one less of its number where `from_low` is set, and at one more
+    /// The union of each bit with those beside it in `sides`, at one less of its number where `from_low` is set, and at one more
     /// where `from_high` is; words are one row, the lowest bits of lane 0 first. What the lowest bit of lane 0 and the
-    /// highest of lane 7 are joined with means nothing.
-    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self;
+    /// highest of lane 7 get means nothing.
+    fn spread(self, sides: Self, from_low: Self, from_high: Self) -> Self;
 }
 
 /// The first, second, third and fourth corner of each face, around it. In the places of a seventh and eighth face, the

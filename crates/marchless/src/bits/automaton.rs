@@ -12,7 +12,7 @@ use super::{
     BitGrid, BitsError, Connectivity,
     morphology::{Ends, beside},
 };
-use crate::simd::{Backend, Job, Simd, dispatch};
+use crate::simd::{Backend, Job, Simd, dispatch_words};
 
 /// When points of a cellular automaton are born and when they survive.
 ///
@@ -77,7 +77,7 @@ impl BitGrid {
     #[must_use]
     pub fn stepped(&self, rule: &Rule) -> Self {
         let mut out = self.zeros();
-        dispatch(Backend::fastest(), Step { from: self, rule, out: &mut out });
+        dispatch_words(Backend::fastest(), Step { from: self, rule, out: &mut out });
         out
     }
 
@@ -87,7 +87,7 @@ impl BitGrid {
     /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
     pub fn step_into(&self, rule: &Rule, out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
-        dispatch(Backend::fastest(), Step { from: self, rule, out });
+        dispatch_words(Backend::fastest(), Step { from: self, rule, out });
         Ok(())
     }
 }

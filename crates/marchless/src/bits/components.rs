@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     lattice::{Region, Shape},
-    simd::{Backend, Job, Simd, dispatch},
+    simd::{Backend, Job, Simd, dispatch_words},
 };
 
 /// The connected components of a grid's set points, numbered by their first points in the order of memory.
@@ -54,7 +54,7 @@ impl BitGrid {
     /// The connected components of the set points.
     pub fn components(&self, connectivity: Connectivity) -> Components {
         let runs = Runs::of(self);
-        let parents = dispatch(Backend::fastest(), Join { grid: self, runs: &runs, connectivity });
+        let parents = dispatch_words(Backend::fastest(), Join { grid: self, runs: &runs, connectivity });
         number(self.shape, runs, parents)
     }
 }

@@ -3,7 +3,7 @@
 use super::{BitGrid, BitsError, paste::word_at};
 use crate::{
     lattice::{Region, Shape},
-    simd::{Backend, Job, Simd, dispatch},
+    simd::{Backend, Job, Simd, dispatch_words},
 };
 
 impl BitGrid {
@@ -41,7 +41,7 @@ impl BitGrid {
 
     /// Turns every point: the complement.
     pub fn invert(&mut self) {
-        dispatch(Backend::fastest(), Invert { words: &mut self.words });
+        dispatch_words(Backend::fastest(), Invert { words: &mut self.words });
         self.clear_unused();
     }
 
@@ -95,7 +95,7 @@ impl BitGrid {
     /// of zeros.
     fn combine(&mut self, other: &Self, combine: impl Fn(u64, u64) -> u64) -> Result<(), BitsError> {
         self.same_shape(other)?;
-        dispatch(Backend::fastest(), Combine { words: &mut self.words, others: &other.words, combine });
+        dispatch_words(Backend::fastest(), Combine { words: &mut self.words, others: &other.words, combine });
         Ok(())
     }
 }

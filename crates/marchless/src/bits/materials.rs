@@ -10,7 +10,7 @@ use crate::{
     buffer::MeshBuffer,
     lattice::Shape,
     mesher::MeshError,
-    simd::{Backend, dispatch},
+    simd::{Backend, dispatch_words},
 };
 use planes::FillPlanes;
 use selection::{MaterialSet, Selection};
@@ -73,7 +73,7 @@ impl MaterialGrid {
             let position = [index % row, index % slab / row, index / slab].map(|v| v as u32);
             return Err(BitsError::MaterialTooLarge { material: materials[index], position, planes });
         }
-        dispatch(Backend::fastest(), FillPlanes { materials, planes: &mut grid.planes });
+        dispatch_words(Backend::fastest(), FillPlanes { materials, planes: &mut grid.planes });
         Ok(grid)
     }
 
@@ -154,7 +154,7 @@ impl MaterialGrid {
     }
 
     fn select_set_into(&self, set: &MaterialSet, out: &mut BitGrid) {
-        dispatch(Backend::fastest(), Selection::new(set, &self.planes, &mut out.words));
+        dispatch_words(Backend::fastest(), Selection::new(set, &self.planes, &mut out.words));
         out.clear_unused();
     }
 

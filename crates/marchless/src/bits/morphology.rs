@@ -6,7 +6,7 @@
 use core::array::from_fn;
 
 use super::{BitGrid, BitsError, Connectivity, pattern::Pattern};
-use crate::simd::{Backend, Eight, Job, Simd, Words, dispatch};
+use crate::simd::{Backend, Eight, Job, Simd, Words, dispatch_words};
 
 impl BitGrid {
     /// The points that are set or have a neighbour that is. Points outside are not set.
@@ -22,7 +22,7 @@ impl BitGrid {
     #[must_use]
     pub fn dilated(&self, connectivity: Connectivity) -> Self {
         let mut out = self.zeros();
-        dispatch(Backend::fastest(), Spread::<false> { from: self, connectivity, out: &mut out });
+        spread(Backend::fastest(), self, connectivity, 0, &mut out);
         out
     }
 
@@ -32,7 +32,7 @@ impl BitGrid {
     /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
     pub fn dilate_into(&self, connectivity: Connectivity, out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
-        dispatch(Backend::fastest(), Spread::<false> { from: self, connectivity, out });
+        spread(Backend::fastest(), self, connectivity, 0, out);
         Ok(())
     }
 
@@ -41,7 +41,7 @@ impl BitGrid {
     #[must_use]
     pub fn eroded(&self, connectivity: Connectivity) -> Self {
         let mut out = self.zeros();
-        dispatch(Backend::fastest(), Spread::<true> { from: self, connectivity, out: &mut out });
+        spread(Backend::fastest(), self, connectivity, u64::MAX, &mut out);
         out
     }
 
@@ -51,7 +51,7 @@ impl BitGrid {
     /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
     pub fn erode_into(&self, connectivity: Connectivity, out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
-        dispatch(Backend::fastest(), Spread::<true> { from: self, connectivity, out });
+        spread(Backend::fastest(), self, connectivity, u64::MAX, out);
         Ok(())
     }
 
@@ -70,14 +70,20 @@ impl BitGrid {
     }
 }
 
-/// Dilation, or erosion.
-struct Spread<'a, const ERODE: bool> {
+/// Dilation of what is set after `flip` has been taken into each word, and with `flip` in each word of what comes out:
+/// 0 for dilation, all ones for erosion.
+fn spread(backend: Backend, from: &BitGrid, connectivity: Connectivity, flip: u64, out: &mut BitGrid) {
+    dispatch_words(backend, Spread { from, connectivity, flip, out });
+}
+
+struct Spread<'a> {
     from: &'a BitGrid,
     connectivity: Connectivity,
+    flip: u64,
     out: &'a mut BitGrid,
 }
 
-impl<const ERODE: bool> Job for Spread<'_, ERODE> {
+impl Job for Spread<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -101,14 +107,14 @@ impl<const ERODE: bool> Job for Spread<'_, ERODE> {
     }
 }
 
-impl<const ERODE: bool> Spread<'_, ERODE> {
+impl Spread<'_> {
     #[inline(always)]
     fn strip<S: Simd, const ROW: usize>(&mut self, start: usize) {
-        let strip = Strip::new(self.from, start, ROW);
+        let strip = Strip::new(self.from, start, ROW, self.flip);
         match self.connectivity {
-            Connectivity::Six => strip.slabs::<S, ROW, ERODE, 6>(self.from, self.out),
-            Connectivity::Eighteen => strip.slabs::<S, ROW, ERODE, 18>(self.from, self.out),
-            Connectivity::TwentySix => strip.slabs::<S, ROW, ERODE, 26>(self.from, self.out),
+            Connectivity::Six => strip.slabs::<S::Eight, ROW, 6>(self.from, self.out),
+            Connectivity::Eighteen => strip.slabs::<S::Eight, ROW, 18>(self.from, self.out),
+            Connectivity::TwentySix => strip.slabs::<S::Eight, ROW, 26>(self.from, self.out),
         }
     }
 }
@@ -126,11 +132,13 @@ struct Strip {
     /// Which points have a neighbour at −x and at +x, for each word.
     from_low: [u64; LANES],
     from_high: [u64; LANES],
+    /// What each word is flipped with when it comes in and when it goes out.
+    flip: u64,
 }
 
 impl Strip {
     #[inline(always)]
-    fn new(grid: &BitGrid, start: usize, lanes_a_row: usize) -> Self {
+    fn new(grid: &BitGrid, start: usize, lanes_a_row: usize, flip: u64) -> Self {
         let (row, last) = (grid.row, grid.last_word());
         let column = |lane: usize| start + lane % lanes_a_row;
         let valid = |column: usize| if column == row - 1 { last } else { u64::MAX };
@@ -139,23 +147,20 @@ impl Strip {
             step: if lanes_a_row == LANES { row } else { LANES / lanes_a_row * lanes_a_row },
             from_low: from_fn(|lane| valid(column(lane)) & if column(lane) == 0 { !1 } else { u64::MAX }),
             from_high: from_fn(|lane| if column(lane) == row - 1 { last >> 1 } else { u64::MAX }),
+            flip,
         }
     }
 
     /// Joins the points of all slabs with their neighbours.
     #[inline(always)]
-    fn slabs<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
-        &self,
-        from: &BitGrid,
-        out: &mut BitGrid,
-    ) {
+    fn slabs<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(&self, from: &BitGrid, out: &mut BitGrid) {
         let [_, ny, nz] = from.shape.size().map(|size| size as usize);
         let len = from.row * ny;
         // Beyond the lowest and the highest slab, these stand for those that are missing.
         let slab = |z: usize| &from.words[len * z.min(nz - 1)..][..len];
         if nz == 1 {
             let mut spare = Words::zeros(len);
-            self.two_slabs::<S, ROW, ERODE, NEIGHBOURS>([slab(0); 4], [&mut out.words, &mut spare]);
+            self.two_slabs::<E, ROW, NEIGHBOURS>([slab(0); 4], [&mut out.words, &mut spare]);
             return;
         }
         for z in (1..nz + nz % 2).step_by(2) {
@@ -163,21 +168,21 @@ impl Strip {
             let z = z.min(nz - 1);
             let (low, high) = out.words[len * (z - 1)..][..2 * len].split_at_mut(len);
             let slabs = [slab(z.saturating_sub(2)), slab(z - 1), slab(z), slab(z + 1)];
-            self.two_slabs::<S, ROW, ERODE, NEIGHBOURS>(slabs, [low, high]);
+            self.two_slabs::<E, ROW, NEIGHBOURS>(slabs, [low, high]);
         }
     }
 
     /// Joins the points of the two slabs in the middle with their neighbours in all four. `ROW`: how many words a row
     /// has, or [`LANES`] where one row at once is treated.
     #[inline(always)]
-    fn two_slabs<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
+    fn two_slabs<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(
         &self,
         slabs: [&[u64]; 4],
         [low, high]: [&mut [u64]; 2],
     ) {
-        let masks = [S::Eight::load(&self.from_low), S::Eight::load(&self.from_high)];
-        let nothing = S::Eight::load(&[nothing::<ERODE>(); LANES]);
-        let (mut before, mut here) = ([[nothing; 2]; 2], load_part::<S, ERODE>(slabs, self.start));
+        let (masks, flip) = ([E::load(&self.from_low), E::load(&self.from_high)], E::load(&[self.flip; LANES]));
+        let nothing = E::load(&[0; LANES]);
+        let (mut before, mut here) = ([[nothing; 2]; 2], self.load_part(slabs, self.start));
         let mut at = self.start;
         // What is written behind the words of a step is overwritten by the next.
         if at == 0 {
@@ -187,18 +192,19 @@ impl Strip {
                 low.get_mut(at..).and_then(|low| low.first_chunk_mut()),
                 high.get_mut(at..).and_then(|high| high.first_chunk_mut()),
             ) {
-                let behind = join_slabs::<S, ERODE>([below, first, second, above]);
+                let behind = join_slabs([below, first, second, above], flip);
                 for (out, slab) in [low, high].into_iter().zip([0, 1]) {
-                    step::<S, ROW, ERODE, NEIGHBOURS>([before[slab], here[slab], behind[slab]], masks).store(out);
+                    let joined = step::<E, ROW, NEIGHBOURS>([before[slab], here[slab], behind[slab]], masks);
+                    joined.xor(flip).store(out);
                 }
                 (before, here) = (here, behind);
                 at += self.step;
             }
         }
         while at < low.len() {
-            let behind = load_part::<S, ERODE>(slabs, at + self.step);
+            let behind = self.load_part(slabs, at + self.step);
             for (out, slab) in [&mut *low, &mut *high].into_iter().zip([0, 1]) {
-                let joined = step::<S, ROW, ERODE, NEIGHBOURS>([before[slab], here[slab], behind[slab]], masks);
+                let joined = step::<E, ROW, NEIGHBOURS>([before[slab], here[slab], behind[slab]], masks).xor(flip);
                 match out[at..].first_chunk_mut() {
                     Some(out) if self.start == 0 => joined.store(out),
                     _ => {
@@ -213,11 +219,16 @@ impl Strip {
             at += self.step;
         }
     }
-}
 
-/// What changes nothing when it is joined with something.
-const fn nothing<const ERODE: bool>() -> u64 {
-    if ERODE { u64::MAX } else { 0 }
+    /// [`join_slabs`] of as many words as there are from `at` on.
+    #[inline(always)]
+    fn load_part<E: Eight>(&self, slabs: [&[u64]; 4], at: usize) -> [[E; 2]; 2] {
+        let mut words = [[self.flip; LANES]; 4];
+        for (words, slab) in words.iter_mut().zip(slabs) {
+            words.iter_mut().zip(slab.iter().skip(at)).for_each(|(word, &there)| *word = there);
+        }
+        join_slabs(words.each_ref(), E::load(&[self.flip; LANES]))
+    }
 }
 
 #[inline(always)]
@@ -227,58 +238,44 @@ fn chunk(slab: &[u64], at: usize) -> Option<&[u64; LANES]> {
 
 /// For both slabs in the middle its words, and those of it, the slab below and the slab above joined.
 #[inline(always)]
-fn join_slabs<S: Simd, const ERODE: bool>(slabs: [&[u64; LANES]; 4]) -> [[S::Eight; 2]; 2] {
-    let [below, first, second, above] = slabs.map(|words| S::Eight::load(words));
-    let both = first.join::<ERODE>(second);
-    [[first, both.join::<ERODE>(below)], [second, both.join::<ERODE>(above)]]
-}
-
-/// [`join_slabs`] of as many words as there are from `at` on.
-#[inline(always)]
-fn load_part<S: Simd, const ERODE: bool>(slabs: [&[u64]; 4], at: usize) -> [[S::Eight; 2]; 2] {
-    if let [Some(below), Some(first), Some(second), Some(above)] = slabs.map(|slab| chunk(slab, at)) {
-        return join_slabs::<S, ERODE>([below, first, second, above]);
-    }
-    let mut words = [[nothing::<ERODE>(); LANES]; 4];
-    for (words, slab) in words.iter_mut().zip(slabs) {
-        words.iter_mut().zip(slab.iter().skip(at)).for_each(|(word, &there)| *word = there);
-    }
-    join_slabs::<S, ERODE>(words.each_ref())
+fn join_slabs<E: Eight>(slabs: [&[u64; LANES]; 4], flip: E) -> [[E; 2]; 2] {
+    let [below, first, second, above] = slabs;
+    let (below, above) = (E::load(below).xor(flip), E::load(above).xor(flip));
+    let (first, second) = (E::load(first).xor(flip), E::load(second).xor(flip));
+    let both = first.or(second);
+    [[first, both.or(below)], [second, both.or(above)]]
 }
 
 /// The words of one step, of those before it, its own and those behind it, of the slab alone and of all three joined.
 #[inline(always)]
-fn step<S: Simd, const ROW: usize, const ERODE: bool, const NEIGHBOURS: u8>(
-    [before, here, behind]: [[S::Eight; 2]; 3],
-    [from_low, from_high]: [S::Eight; 2],
-) -> S::Eight {
+fn step<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(
+    [before, here, behind]: [[E; 2]; 3],
+    [from_low, from_high]: [E; 2],
+) -> E {
     let (centre, sides) = match NEIGHBOURS {
-        6 => (along_y::<S, ROW, ERODE>(here[1], [before[0], here[0], behind[0]]), here[0]),
+        6 => (along_y::<E, ROW>(here[1], [before[0], here[0], behind[0]]), here[0]),
         18 => (
-            along_y::<S, ROW, ERODE>(here[1], [before[1], here[1], behind[1]]),
-            along_y::<S, ROW, ERODE>(here[1], [before[0], here[0], behind[0]]),
+            along_y::<E, ROW>(here[1], [before[1], here[1], behind[1]]),
+            along_y::<E, ROW>(here[1], [before[0], here[0], behind[0]]),
         ),
         _ => {
-            let square = along_y::<S, ROW, ERODE>(here[1], [before[1], here[1], behind[1]]);
+            let square = along_y::<E, ROW>(here[1], [before[1], here[1], behind[1]]);
             (square, square)
         }
     };
-    centre.spread::<ERODE>(sides, from_low, from_high)
+    centre.spread(sides, from_low, from_high)
 }
 
 /// Joins the words of `centre` with those beside them along y, of the steps before, of this one and behind it.
 #[inline(always)]
-fn along_y<S: Simd, const ROW: usize, const ERODE: bool>(
-    centre: S::Eight,
-    [before, here, behind]: [S::Eight; 3],
-) -> S::Eight {
+fn along_y<E: Eight, const ROW: usize>(centre: E, [before, here, behind]: [E; 3]) -> E {
     let [low, high] = match ROW {
-        1 => [S::Eight::window::<7>(before, here), S::Eight::window::<1>(here, behind)],
-        2 => [S::Eight::window::<6>(before, here), S::Eight::window::<2>(here, behind)],
-        4 => [S::Eight::window::<4>(before, here), S::Eight::window::<4>(here, behind)],
+        1 => [E::window::<7>(before, here), E::window::<1>(here, behind)],
+        2 => [E::window::<6>(before, here), E::window::<2>(here, behind)],
+        4 => [E::window::<4>(before, here), E::window::<4>(here, behind)],
         _ => [before, behind],
     };
-    centre.join::<ERODE>(low).join::<ERODE>(high)
+    centre.or(low).or(high)
 }
 
 /// The points beside those of a word, at −x and at +x, of the word before it, itself and the word behind it.
@@ -310,9 +307,9 @@ mod tests {
     use super::*;
     use crate::lattice::Shape;
 
-    fn spread<const ERODE: bool>(backend: Backend, from: &BitGrid, connectivity: Connectivity) -> BitGrid {
+    fn spread(backend: Backend, from: &BitGrid, connectivity: Connectivity, flip: u64) -> BitGrid {
         let mut out = from.zeros();
-        dispatch(backend, Spread::<ERODE> { from, connectivity, out: &mut out });
+        super::spread(backend, from, connectivity, flip, &mut out);
         out
     }
 
@@ -332,13 +329,13 @@ mod tests {
                     .iter()
                     .flat_map(|&backend| Connectivity::ALL.map(|connectivity| (backend, connectivity)))
                 {
-                    let dilated = spread::<false>(backend, &sparse, connectivity);
+                    let dilated = spread(backend, &sparse, connectivity, 0);
+                    assert!(dilated == spread(Backend::Portable, &sparse, connectivity, 0), "{backend:?} {nx} {ny}");
+                    let eroded = spread(backend, &dense, connectivity, u64::MAX);
                     assert!(
-                        dilated == spread::<false>(Backend::Portable, &sparse, connectivity),
+                        eroded == spread(Backend::Portable, &dense, connectivity, u64::MAX),
                         "{backend:?} {nx} {ny}"
                     );
-                    let eroded = spread::<true>(backend, &dense, connectivity);
-                    assert!(eroded == spread::<true>(Backend::Portable, &dense, connectivity), "{backend:?} {nx} {ny}");
                 }
             }
         }

@@ -5,7 +5,7 @@
 //! another row.
 
 use super::{BitGrid, BitsError, pattern::Pattern};
-use crate::simd::{Backend, Job, Simd, Words, dispatch};
+use crate::simd::{Backend, Job, Simd, Words, dispatch_words};
 
 impl BitGrid {
     /// The grid with every set point moved by `offset`: point `p` of it is point `p - offset` of this one. Zeros come in
@@ -23,7 +23,7 @@ impl BitGrid {
     #[must_use]
     pub fn shifted(&self, offset: [i32; 3]) -> Self {
         let mut out = self.zeros();
-        dispatch(Backend::fastest(), Shift { from: self, offset, out: &mut out });
+        dispatch_words(Backend::fastest(), Shift { from: self, offset, out: &mut out });
         out
     }
 
@@ -33,7 +33,7 @@ impl BitGrid {
     /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
     pub fn shift_into(&self, offset: [i32; 3], out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
-        dispatch(Backend::fastest(), Shift { from: self, offset, out });
+        dispatch_words(Backend::fastest(), Shift { from: self, offset, out });
         Ok(())
     }
 

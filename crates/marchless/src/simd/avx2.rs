@@ -44,16 +44,17 @@ impl Eight for Words {
     }
 
     #[inline(always)]
-    fn join<const AND: bool>(self, other: Self) -> Self {
+    fn or(self, other: Self) -> Self {
         let ([a, b], [c, d]) = (self.0, other.0);
         // SAFETY: within `run`.
-        Self(unsafe {
-            if AND {
-                [_mm256_and_si256(a, c), _mm256_and_si256(b, d)]
-            } else {
-                [_mm256_or_si256(a, c), _mm256_or_si256(b, d)]
-            }
-        })
+        Self(unsafe { [_mm256_or_si256(a, c), _mm256_or_si256(b, d)] })
+    }
+
+    #[inline(always)]
+    fn xor(self, other: Self) -> Self {
+        let ([a, b], [c, d]) = (self.0, other.0);
+        // SAFETY: within `run`.
+        Self(unsafe { [_mm256_xor_si256(a, c), _mm256_xor_si256(b, d)] })
     }
 
     #[inline(always)]
@@ -72,13 +73,13 @@ impl Eight for Words {
     }
 
     #[inline(always)]
-    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self {
+    fn spread(self, sides: Self, from_low: Self, from_high: Self) -> Self {
         let [a, b] = sides.0;
         // SAFETY: within `run`.
         Self(unsafe {
             [
-                spread::<AND>(self.0[0], [three_on(a, a), a, one_on(a, b)], from_low.0[0], from_high.0[0]),
-                spread::<AND>(self.0[1], [three_on(a, b), b, one_on(b, b)], from_low.0[1], from_high.0[1]),
+                spread(self.0[0], [three_on(a, a), a, one_on(a, b)], from_low.0[0], from_high.0[0]),
+                spread(self.0[1], [three_on(a, b), b, one_on(b, b)], from_low.0[1], from_high.0[1]),
             ]
         })
     }
@@ -87,21 +88,11 @@ impl Eight for Words {
 /// [`Eight::spread`] for half of the lanes, of the sides in the lanes before them, in them and behind them.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn spread<const AND: bool>(
-    centre: __m256i,
-    [below, here, above]: [__m256i; 3],
-    from_low: __m256i,
-    from_high: __m256i,
-) -> __m256i {
+fn spread(centre: __m256i, [below, here, above]: [__m256i; 3], from_low: __m256i, from_high: __m256i) -> __m256i {
     let low = _mm256_or_si256(_mm256_slli_epi64::<1>(here), _mm256_srli_epi64::<63>(below));
     let high = _mm256_or_si256(_mm256_srli_epi64::<1>(here), _mm256_slli_epi64::<63>(above));
-    if AND {
-        let (low, high) = (_mm256_andnot_si256(low, from_low), _mm256_andnot_si256(high, from_high));
-        _mm256_andnot_si256(_mm256_or_si256(low, high), centre)
-    } else {
-        let (low, high) = (_mm256_and_si256(low, from_low), _mm256_and_si256(high, from_high));
-        _mm256_or_si256(_mm256_or_si256(low, high), centre)
-    }
+    let (low, high) = (_mm256_and_si256(low, from_low), _mm256_and_si256(high, from_high));
+    _mm256_or_si256(_mm256_or_si256(low, high), centre)
 }
 
 /// The lanes 1–4 of two times four.

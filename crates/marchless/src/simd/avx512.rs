@@ -103,9 +103,15 @@ impl Eight for Words {
     }
 
     #[inline(always)]
-    fn join<const AND: bool>(self, other: Self) -> Self {
+    fn or(self, other: Self) -> Self {
         // SAFETY: within `run`.
-        Self(unsafe { if AND { _mm512_and_si512(self.0, other.0) } else { _mm512_or_si512(self.0, other.0) } })
+        Self(unsafe { _mm512_or_si512(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn xor(self, other: Self) -> Self {
+        // SAFETY: within `run`.
+        Self(unsafe { _mm512_xor_si512(self.0, other.0) })
     }
 
     #[inline(always)]
@@ -123,18 +129,13 @@ impl Eight for Words {
     }
 
     #[inline(always)]
-    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self {
+    fn spread(self, sides: Self, from_low: Self, from_high: Self) -> Self {
         // SAFETY: within `run`.
         Self(unsafe {
             let low = _mm512_shldi_epi64::<1>(sides.0, _mm512_alignr_epi64::<7>(sides.0, sides.0));
             let high = _mm512_shrdi_epi64::<1>(sides.0, _mm512_alignr_epi64::<1>(sides.0, sides.0));
-            if AND {
-                let (low, high) = (_mm512_andnot_si512(low, from_low.0), _mm512_andnot_si512(high, from_high.0));
-                _mm512_andnot_si512(_mm512_or_si512(low, high), self.0)
-            } else {
-                let (low, high) = (_mm512_and_si512(low, from_low.0), _mm512_and_si512(high, from_high.0));
-                _mm512_or_si512(_mm512_or_si512(low, high), self.0)
-            }
+            let (low, high) = (_mm512_and_si512(low, from_low.0), _mm512_and_si512(high, from_high.0));
+            _mm512_or_si512(_mm512_or_si512(low, high), self.0)
         })
     }
 }

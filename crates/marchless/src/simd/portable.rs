@@ -94,8 +94,13 @@ impl Eight for [u64; 8] {
     }
 
     #[inline(always)]
-    fn join<const AND: bool>(self, other: Self) -> Self {
-        from_fn(|lane| if AND { self[lane] & other[lane] } else { self[lane] | other[lane] })
+    fn or(self, other: Self) -> Self {
+        from_fn(|lane| self[lane] | other[lane])
+    }
+
+    #[inline(always)]
+    fn xor(self, other: Self) -> Self {
+        from_fn(|lane| self[lane] ^ other[lane])
     }
 
     #[inline(always)]
@@ -104,13 +109,11 @@ impl Eight for [u64; 8] {
     }
 
     #[inline(always)]
-    fn spread<const AND: bool>(self, sides: Self, from_low: Self, from_high: Self) -> Self {
-        let sides = if AND { sides.map(|word| !word) } else { sides };
+    fn spread(self, sides: Self, from_low: Self, from_high: Self) -> Self {
         from_fn(|lane| {
             let low = sides[lane] << 1 | sides[(lane + 7) % 8] >> 63;
             let high = sides[lane] >> 1 | sides[(lane + 1) % 8] << 63;
-            let sides = low & from_low[lane] | high & from_high[lane];
-            if AND { self[lane] & !sides } else { self[lane] | sides }
+            self[lane] | low & from_low[lane] | high & from_high[lane]
         })
     }
 }
