@@ -13,5 +13,5 @@ target="$(realpath -m "${CARGO_TARGET_DIR:-target}")/address_sanitizer"
 
 # For a named target, flags leave build scripts and procedural macros alone.
 RUSTFLAGS="-Zsanitizer=address" cargo +nightly test --quiet --locked --target "$host" --target-dir "$target" \
-    --package marchless --test backends --test oracle --test surface
+    --package marchless --lib --test backends --test oracle --test surface --test bits_ops --test bits_masks
 echo "AddressSanitizer: no read or write beyond a buffer"

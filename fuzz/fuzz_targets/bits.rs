@@ -51,7 +51,7 @@ struct Pair {
 
 impl Pair {
     fn arbitrary(u: &mut Unstructured<'_>) -> Result<Self> {
-        let mut size = [u.int_in_range(1..=140)?, u.int_in_range(1..=4)?, u.int_in_range(1..=4)?];
+        let mut size = [u.int_in_range(1..=700)?, u.int_in_range(1..=4)?, u.int_in_range(1..=4)?];
         size.rotate_right(u.int_in_range(0..=2)?);
         Self::of(size, u)
     }

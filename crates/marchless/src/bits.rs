@@ -45,6 +45,9 @@ pub use tile::{Tile, TileGrid};
 /// Bits are kept in rows of 64-bit words along x: bit `x % 64` of word `x / 64` of row `y + ny·z` is the point `[x, y,
 /// z]`. A row starts with a new word; what is left of its last word is zero.
 ///
+/// Whoever makes the first grid of a shape learns by an error that memory does not hold it. Operations that give another
+/// grid of that shape end the program where memory runs out, as vectors do; their `…_into` forms use a grid that is there.
+///
 /// ```
 /// use marchless::{Shape, bits::BitGrid};
 ///
@@ -111,8 +114,8 @@ impl BitGrid {
         Ok(grid)
     }
 
-    /// The grid of the samples that are inside: whose weight is below `isovalue`, in voxels and finite. Of
-    /// [padded](Samples::padded) samples, the padding is left out.
+    /// The grid of the samples that are inside: whose weight is below `isovalue`, which is in voxels and must be finite.
+    /// Of [padded](Samples::padded) samples, the padding is left out.
     ///
     /// # Errors
     /// [`BitsError::TooLarge`] where memory does not hold it, [`BitsError::OnlyPadding`] where padding is all there is,
@@ -221,8 +224,10 @@ impl BitGrid {
     /// A point's word and its bit there.
     fn place_of(&self, [x, y, z]: [u32; 3]) -> Option<(usize, u32)> {
         let [nx, ny, nz] = self.shape.size();
-        let row = y as usize + ny as usize * z as usize;
-        (x < nx && y < ny && z < nz).then(|| (self.row * row + x as usize / 64, x % 64))
+        (x < nx && y < ny && z < nz).then(|| {
+            let row = y as usize + ny as usize * z as usize;
+            (self.row * row + x as usize / 64, x % 64)
+        })
     }
 }
 
@@ -240,7 +245,7 @@ pub(crate) fn set_bits(mut word: u64) -> impl Iterator<Item = u32> {
 #[non_exhaustive]
 pub enum BitsError {
     /// Memory does not hold the grid.
-    #[error("memory does not hold a grid of {shape} bits")]
+    #[error("memory does not hold what a grid of {shape} bits takes")]
     TooLarge {
         /// What was asked for.
         shape: Shape,

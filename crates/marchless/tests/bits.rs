@@ -7,7 +7,7 @@ use marchless::{
 use proptest::prelude::*;
 
 /// Sizes around those of words, and of what vector instructions take at once.
-const SIZES: [u32; 10] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130];
+const SIZES: [u32; 12] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 600];
 
 fn shapes() -> impl Strategy<Value = Shape> {
     (proptest::sample::select(&SIZES[..]), 1..5u32, 1..5u32, 0..3usize).prop_map(|(long, a, b, turn)| {

@@ -9,7 +9,7 @@ use marchless::{
 use proptest::{array::uniform3, prelude::*, test_runner::TestCaseResult};
 
 /// Sizes around those of words.
-const SIZES: [u32; 10] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130];
+const SIZES: [u32; 12] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 600];
 
 /// What makes a grid: its size, how many of eight points are set, and the seed for which.
 #[derive(Clone, Copy, Debug)]

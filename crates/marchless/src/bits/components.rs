@@ -44,7 +44,7 @@ pub struct Components {
 pub struct Component {
     /// How many points it has.
     pub size: usize,
-    /// The smallest region that holds it; coordinates that `i32` lacks become the highest one.
+    /// The smallest region that holds it; coordinates that `i32` lacks become the highest one (it may then be empty).
     pub bounds: Region,
     /// Its first point in the order of memory: that of the lowest z, among these of the lowest y, then of the lowest x.
     pub first: [u32; 3],
@@ -165,7 +165,12 @@ fn number(shape: Shape, runs: Runs, mut parents: Vec<usize>) -> Components {
                 parents[run] = parents[parents[run]];
                 let component = &mut components[parents[run]];
                 component.size += (end - start) as usize;
-                component.bounds = component.bounds.union(&Region { min, max });
+                // Not a union of regions, which leaves out empty ones: beyond `i32`, this may be one.
+                let bounds = &mut component.bounds;
+                for axis in 0..3 {
+                    bounds.min[axis] = bounds.min[axis].min(min[axis]);
+                    bounds.max[axis] = bounds.max[axis].max(max[axis]);
+                }
             }
         }
     }
@@ -211,7 +216,8 @@ impl Components {
         (run < behind && self.runs.spans[run][0] <= x).then(|| self.labels[run])
     }
 
-    /// The points of one of them, in a grid as large as the whole; nothing where there is none of that number.
+    /// The points of one of them, in a grid as large as the whole; nothing where there is none of that number. For many
+    /// of them at once, [`keep`](Self::keep) goes through the grid only once.
     pub fn mask(&self, index: usize) -> BitGrid {
         let mut grid = BitGrid::empty(self.shape);
         let Some(Component { bounds, .. }) = self.get(index) else { return grid };
@@ -258,5 +264,26 @@ impl<'a> IntoIterator for &'a Components {
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+
+    #[test]
+    fn what_lies_beyond_the_coordinates_of_regions_is_not_lost() {
+        let nx = (1u32 << 31) + 64;
+        let shape = Shape::new([nx, 3, 1]).unwrap();
+        let span = [nx - 10, nx - 4];
+        let runs = Runs { spans: vec![span, span], starts: vec![0, 0, 1, 2] };
+        let components = number(shape, runs, vec![0, 0]);
+        let bounds = Region::new([i32::MAX, 1, 0], [i32::MAX, 3, 1]);
+        assert_eq!(
+            components.iter().copied().collect::<Vec<_>>(),
+            [Component { size: 12, bounds, first: [nx - 10, 1, 0] }]
+        );
     }
 }

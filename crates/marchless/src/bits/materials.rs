@@ -124,7 +124,7 @@ impl MaterialGrid {
     }
 
     /// Meshes the boundary of these materials against all others into `out`, whose former content is dropped, as
-    /// [`BitGrid::mesh`] does; [`MeshBuffer::materials`] says which of them is inside at each vertex.
+    /// [`BitGrid::mesh`] does (up to 2²³ cells per axis); [`MeshBuffer::materials`] says which of them is inside at each vertex.
     ///
     /// Where two materials touch, the boundaries of both have the same vertices, in the middle of the edges between
     /// them, bit for bit. (In cells where more than two meet, or where a material touches itself along an edge or

@@ -84,13 +84,15 @@ impl BitGrid {
         span_words(span).any(|(index, bits)| row[index] & bits != 0)
     }
 
-    /// The part of a region that lies in the grid: of each axis, the first and the one behind the last.
+    /// The part of a region that lies in the grid: of each axis, the first and the one behind the last. Of all axes
+    /// nothing where it is empty.
     fn clipped(&self, region: Region) -> [[u32; 2]; 3] {
         let size = self.shape.size();
-        core::array::from_fn(|axis| {
+        let clipped: [[u32; 2]; 3] = core::array::from_fn(|axis| {
             let [min, max] = [region.min[axis], region.max[axis]].map(|v| v.max(0) as u32);
             [min, max.min(size[axis])]
-        })
+        });
+        if clipped.iter().any(|[start, end]| start >= end) { [[0; 2]; 3] } else { clipped }
     }
 }
 
