@@ -1,4 +1,4 @@
-//! [`write`]: a mesh as a binary glTF file, which Blender and most viewers open.
+//! [`write()`]: a mesh as a binary glTF file, which Blender and most viewers open.
 
 use std::borrow::Cow;
 use std::io::{self, Write as _};
