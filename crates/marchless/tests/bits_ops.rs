@@ -28,8 +28,10 @@ impl fmt::Debug for Case {
 
 impl Case {
     fn any() -> impl Strategy<Value = Self> {
-        let size = (select(&SIZES[..]), 1..6u32, 1..6u32, 0..3usize).prop_map(|(long, a, b, turn)| {
-            let mut size = [long, a, b];
+        // Another one, too, beside those that are not long.
+        let second = select(&[1, 2, 3, 4, 5, 31, 33, 64, 65][..]);
+        let size = (select(&SIZES[..]), second, 1..6u32, 0..3usize).prop_map(|(long, a, b, turn)| {
+            let mut size = [long, if long > 130 { a.min(5) } else { a }, b];
             size.rotate_right(turn);
             size
         });
