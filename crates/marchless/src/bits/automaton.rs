@@ -8,10 +8,7 @@
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
 
-use super::{
-    BitGrid, BitsError, Connectivity,
-    morphology::{Ends, beside},
-};
+use super::{BitGrid, BitsError, Connectivity, pattern::Pattern};
 use crate::simd::{Backend, Job, Simd, dispatch_words};
 
 /// When points of a cellular automaton are born and when they survive.
@@ -247,6 +244,30 @@ fn block(plane: &[u64], at: usize) -> &[u64; BLOCK] {
 fn parts(planes: &mut [Vec<u64>; 4], words: Range<usize>) -> [&mut [u64]; 4] {
     let [a, b, c, d] = planes;
     [&mut a[words.clone()], &mut b[words.clone()], &mut c[words.clone()], &mut d[words]]
+}
+
+/// The points beside those of a word, at −x and at +x, of the word before it, itself and the word behind it.
+#[inline(always)]
+const fn beside([low, here, high]: [u64; 3]) -> [u64; 2] {
+    [here << 1 | low >> 63, here >> 1 | high << 63]
+}
+
+/// Which points have a neighbour at −x and at +x in the same row, for each word of a row.
+struct Ends {
+    from_low: Pattern,
+    from_high: Pattern,
+}
+
+impl Ends {
+    #[inline(always)]
+    fn new(grid: &BitGrid) -> Self {
+        let (row, rows, last) = (grid.row, grid.shape.size()[1] as usize, grid.last_word());
+        let valid = move |column: usize| if column == row - 1 { last } else { u64::MAX };
+        Self {
+            from_low: Pattern::new(row, rows, 0, |column| valid(column) & if column == 0 { !1 } else { u64::MAX }),
+            from_high: Pattern::new(row, rows, 0, |column| if column == row - 1 { last >> 1 } else { u64::MAX }),
+        }
+    }
 }
 
 /// Adds three bits: the sum's low bit and its high one.

@@ -5,7 +5,7 @@
 
 use core::array::from_fn;
 
-use super::{BitGrid, BitsError, Connectivity, pattern::Pattern};
+use super::{BitGrid, BitsError, Connectivity};
 use crate::simd::{Backend, Eight, Job, Simd, Words, dispatch_words};
 
 impl BitGrid {
@@ -276,30 +276,6 @@ fn along_y<E: Eight, const ROW: usize>(centre: E, [before, here, behind]: [E; 3]
         _ => [before, behind],
     };
     centre.or(low).or(high)
-}
-
-/// The points beside those of a word, at −x and at +x, of the word before it, itself and the word behind it.
-#[inline(always)]
-pub(super) const fn beside([low, here, high]: [u64; 3]) -> [u64; 2] {
-    [here << 1 | low >> 63, here >> 1 | high << 63]
-}
-
-/// Which points have a neighbour at −x and at +x in the same row, for each word of a row.
-pub(super) struct Ends {
-    pub(super) from_low: Pattern,
-    pub(super) from_high: Pattern,
-}
-
-impl Ends {
-    #[inline(always)]
-    pub(super) fn new(grid: &BitGrid) -> Self {
-        let (row, rows, last) = (grid.row, grid.shape.size()[1] as usize, grid.last_word());
-        let valid = move |column: usize| if column == row - 1 { last } else { u64::MAX };
-        Self {
-            from_low: Pattern::new(row, rows, 0, |column| valid(column) & if column == 0 { !1 } else { u64::MAX }),
-            from_high: Pattern::new(row, rows, 0, |column| if column == row - 1 { last >> 1 } else { u64::MAX }),
-        }
-    }
 }
 
 #[cfg(test)]
