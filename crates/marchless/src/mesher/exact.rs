@@ -39,19 +39,18 @@ pub(super) struct Exact {
 /// A cell that its signs leave open.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OpenCell {
+    /// The index of its lowest corner in the slab.
+    at: usize,
     /// The place of its code among all codes.
-    pub(super) place: u32,
-    /// The lattice position of its lowest corner.
-    pub(super) x: u32,
-    pub(super) y: u32,
+    place: u32,
     /// Its case and its [`joined_faces`], once decided.
     case: CaseIndex,
     joined: u8,
 }
 
 impl OpenCell {
-    pub(super) const fn new(place: u32, x: u32, y: u32) -> Self {
-        Self { place, x, y, case: CaseIndex(0), joined: 0 }
+    pub(super) const fn new(at: usize, place: u32) -> Self {
+        Self { at, place, case: CaseIndex(0), joined: 0 }
     }
 }
 
@@ -108,10 +107,10 @@ impl Exact {
         out: &mut MeshBuffer,
     ) -> u64 {
         // Without a branch, for which way a cell goes is anyone's guess. Those with more to do move to the front.
-        let mut left = 0;
+        let (mut left, corners) = (0, Corners::new(lattice, planes, settings));
         for index in 0..self.open.len() {
             let cell = self.open[index];
-            let weights = weights_of(lattice, planes, settings, cell.x, cell.y);
+            let weights = corners.weights(cell.at);
             let code = &mut codes[cell.place as usize];
             let case = CaseIndex(*code as u8);
             let larger = S::larger_products(&weights);
@@ -125,7 +124,7 @@ impl Exact {
             return 0;
         }
         self.open.truncate(left);
-        self.make(lattice, planes, settings, codes, first_vertex, bounds, out)
+        self.make(lattice, planes, &corners, settings, codes, first_vertex, bounds, out)
     }
 
     /// Makes those cells that have to be.
@@ -134,6 +133,7 @@ impl Exact {
         &mut self,
         lattice: &Lattice,
         planes: &Planes<'_, W>,
+        corners: &Corners<'_, W>,
         settings: &MeshSettings,
         codes: &mut [u16],
         first_vertex: u64,
@@ -141,12 +141,13 @@ impl Exact {
         out: &mut MeshBuffer,
     ) -> u64 {
         let mut made = 0;
-        for &OpenCell { place, x, y, case, joined } in &self.open {
-            let weights = weights_of(lattice, planes, settings, x, y);
+        for &OpenCell { at, place, case, joined } in &self.open {
+            let weights = corners.weights(at);
             let outcome = table::outcome(case, joined);
             let waist = if outcome.may_have_tunnel() { tunnel::waist(&weights) } else { None };
             if waist.is_some() || outcome.is_made() {
                 let (first_interior, start) = ((first_vertex + made) as u32, self.triangles.len());
+                let (x, y) = lattice.position_of(at);
                 let cell = Open { lattice, planes, settings, x, y, case, weights };
                 made += cell.make(joined, outcome, waist, &mut self.triangles, bounds, out);
                 let (place, count) = (place as usize, (self.triangles.len() - start) as u8);
@@ -182,24 +183,39 @@ pub(super) const fn open_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
     across_x | across_y | across_z | diagonal
 }
 
-/// The weights at a cell's corners, less the isovalue, in voxels.
-#[inline(always)]
-fn weights_of<W: Weight>(
-    lattice: &Lattice,
-    planes: &Planes<'_, W>,
-    settings: &MeshSettings,
-    x: u32,
-    y: u32,
-) -> [f64; 8] {
-    let (at, isovalue) = (lattice.index(x, y), f64::from(settings.isovalue));
-    let [_, low, high, _] = planes.slabs;
-    let (a, c) = (&low[at..][..2], &low[at + lattice.stride..][..2]);
-    let (e, g) = (&high[at..][..2], &high[at + lattice.stride..][..2]);
-    let (mut weights, mut corner) =
-        ([a[0], a[1], c[0], c[1], e[0], e[1], g[0], g[1]].map(W::to_voxels).map(f64::from), 0);
-    while corner < 8 {
-        weights[corner] -= isovalue;
-        corner += 1;
+/// The samples of two slabs, such that those at the eight corners of a cell have one index.
+struct Corners<'a, W> {
+    /// Along x, y and z in turn; the next sample along x is behind each of them.
+    rows: [&'a [W]; 4],
+    isovalue: f64,
+}
+
+impl<'a, W: Weight> Corners<'a, W> {
+    #[inline(always)]
+    fn new(lattice: &Lattice, planes: &Planes<'a, W>, settings: &MeshSettings) -> Self {
+        let [_, low, high, _] = planes.slabs;
+        // Of one length, so that one comparison shows that an index is in all of them.
+        let len = low.len().min(high.len()) - lattice.stride;
+        let rows = [&low[..len], &low[lattice.stride..][..len], &high[..len], &high[lattice.stride..][..len]];
+        Self { rows, isovalue: settings.isovalue.into() }
     }
-    weights
+
+    /// The weights at a cell's corners, less the isovalue, in voxels. `at`: the index of its lowest corner.
+    #[inline(always)]
+    fn weights(&self, at: usize) -> [f64; 8] {
+        let [low, next, high, next_high] = self.rows;
+        let ([a, b], [c, d], [e, f], [g, h]) = (pair(low, at), pair(next, at), pair(high, at), pair(next_high, at));
+        let (mut weights, mut corner) = ([a, b, c, d, e, f, g, h].map(W::to_voxels).map(f64::from), 0);
+        while corner < 8 {
+            weights[corner] -= self.isovalue;
+            corner += 1;
+        }
+        weights
+    }
+}
+
+/// Two neighbouring samples.
+#[inline(always)]
+fn pair<W: Copy>(samples: &[W], at: usize) -> [W; 2] {
+    *samples[at..].first_chunk().expect("a cell's corners are in its slabs")
 }

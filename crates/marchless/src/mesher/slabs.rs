@@ -75,6 +75,12 @@ impl Lattice {
         self.origin + y as usize * self.stride + x as usize
     }
 
+    /// The `x` and `y` of a meshed sample's [index](Lattice::index).
+    pub(super) const fn position_of(&self, index: usize) -> (u32, u32) {
+        let from_origin = index - self.origin;
+        ((from_origin % self.stride) as u32, (from_origin / self.stride) as u32)
+    }
+
     /// How far apart in memory the ends of an edge along `AXIS` are in their slabs.
     #[inline(always)]
     pub(super) const fn step<const AXIS: usize>(&self) -> usize {

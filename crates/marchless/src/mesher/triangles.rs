@@ -81,10 +81,16 @@ impl Codes {
         for start in (0..cells).step_by(WORDS) {
             let count = (cells - start).min(WORDS);
             let [a, b, c, d, e, f, g, h] = corner_words(low, high, start, count, words);
-            for i in 0..count {
-                let any = a[i] | b[i] | c[i] | d[i] | e[i] | f[i] | g[i] | h[i];
-                let all = a[i] & b[i] & c[i] & d[i] & e[i] & f[i] & g[i] & h[i];
-                active[i] = any & !all;
+            if open_cells.is_some() {
+                // In one loop: the corners are loaded once.
+                for i in 0..count {
+                    let corners = [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]];
+                    (active[i], open[i]) = (active_cells(corners), exact::open_cells(corners));
+                }
+            } else {
+                for i in 0..count {
+                    active[i] = active_cells([a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]]);
+                }
             }
             let ends_row = |i: usize| words == 1 || (start + i + 1).is_multiple_of(words);
             if self.codes.len() < gathered + 64 * count {
@@ -103,9 +109,6 @@ impl Codes {
                 gathered += found;
             }
             let Some(open_cells) = &mut open_cells else { continue };
-            for i in 0..count {
-                open[i] = exact::open_cells([a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]]);
-            }
             let mut nonzero = S::nonzero(filled(open, count));
             while nonzero != 0 {
                 let i = nonzero.trailing_zeros() as usize;
@@ -113,10 +116,11 @@ impl Codes {
                 // Behind a row's last cell, its last samples stand for those that are missing.
                 let mut bits = open[i % WORDS] & if ends_row(i) { !last_bit } else { u64::MAX };
                 let (y, x) = lattice.place_of(start + i);
+                let at = lattice.index(x, y);
                 while bits != 0 {
                     let below = bits ^ (bits - 1);
                     let place = firsts[i % WORDS] + (active[i % WORDS] & below >> 1).count_ones() as usize;
-                    open_cells.push(OpenCell::new(place as u32, x + bits.trailing_zeros(), y));
+                    open_cells.push(OpenCell::new(at + bits.trailing_zeros() as usize, place as u32));
                     bits &= bits - 1;
                 }
             }
@@ -157,6 +161,12 @@ pub(super) fn join<S: Simd>(
     write::<S>(&codes[done..], &mut counters, indices);
 }
 
+/// The bits of the cells that the surface crosses. Bit `x` of `corners[k]` is corner `k` of cell `x`.
+#[inline(always)]
+const fn active_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
+    (a | b | c | d | e | f | g | h) & !(a & b & c & d & e & f & g & h)
+}
+
 /// The signs of the eight corners of cells, a word each for `count` words of cells from `start` on.
 #[inline(always)]
 fn corner_words<'a>(low: &'a Signs, high: &'a Signs, start: usize, count: usize, words: usize) -> [&'a [u64]; 8] {
@@ -193,13 +203,15 @@ fn write<S: Simd>(codes: &[u16], counters: &mut [u32; 8], indices: &mut Vec<u32>
 
 /// Writes the triangles of a cell that was made, and takes the counters past it.
 fn add(case: usize, triangles: &[[u8; 3]], first_interior: u32, counters: &mut [u32; 8], indices: &mut Vec<u32>) {
-    indices.extend(triangles.iter().flatten().map(|&corner| match usize::from(corner).checked_sub(12) {
-        Some(interior) => first_interior.wrapping_add(interior as u32),
-        None => {
-            let vertex = vertex(case, corner.into());
-            counters[usize::from(vertex % 8)].wrapping_add(u32::from(vertex >> 4))
-        }
-    }));
+    let mut vertices = [0; 32];
+    for (edge, index) in vertices[..12].iter_mut().enumerate() {
+        let vertex = vertex(case, edge);
+        *index = counters[usize::from(vertex % 8)].wrapping_add(u32::from(vertex >> 4));
+    }
+    for (interior, index) in (0..).zip(&mut vertices[12..]) {
+        *index = first_interior.wrapping_add(interior);
+    }
+    indices.extend(triangles.iter().flat_map(|corners| corners.map(|corner| vertices[usize::from(corner % 32)])));
     for (counter, step) in counters.iter_mut().zip(RECIPES[case].steps) {
         *counter = counter.wrapping_add(step.into());
     }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use super::{
     Open,
     table::{FIRST_INTERIOR, Outcome, Sheets},
-    tunnel::{RING, Strip, Waist, ring, spaced, straightened, strip},
+    tunnel::{RING, Strip, Waist, ring, spaced, straightened_corner, straightened_crossing, strip},
 };
 use crate::{
     buffer::MeshBuffer,
@@ -50,11 +50,12 @@ impl<W: Weight> Open<'_, W> {
         if sheets.rim().is_empty() {
             return 0;
         }
-        let mut mean = [0.0; 3];
+        let mut sum = [0.0; 3];
         for &edge in sheets.rim() {
-            let crossing = field.crossing(edge);
-            mean = [0, 1, 2].map(|axis| mean[axis] + crossing[axis] / sheets.rim().len() as f64);
+            let [x, y, z] = field.crossing(edge);
+            sum = [sum[0] + x, sum[1] + y, sum[2] + z];
         }
+        let mean = sum.map(|sum| sum / sheets.rim().len() as f64);
         self.vertex(&field, field.nearest_to(mean), bounds, out);
         1
     }
@@ -93,11 +94,15 @@ impl Trilinear {
 
     /// Where the interpolant is 0 on an edge, whose ends differ in sign.
     fn crossing(&self, edge: Edge) -> [f64; 3] {
-        let [low, high] = edge.corners();
-        let (a, b) = (self.0[low.index()], self.0[high.index()]);
-        let mut crossing = low.offset().map(f64::from);
-        crossing[edge.axis()] = a / (a - b);
+        let mut crossing = edge.corners()[0].offset().map(f64::from);
+        crossing[edge.axis()] = self.crossing_along(edge);
         crossing
+    }
+
+    /// The coordinate of the crossing along the edge.
+    fn crossing_along(&self, edge: Edge) -> f64 {
+        let [a, b] = edge.corners().map(|corner| self.0[corner.index()]);
+        a / (a - b)
     }
 
     /// The value and the gradient at a point.
@@ -127,7 +132,8 @@ impl Trilinear {
     fn nearest_to(&self, mut point: [f64; 3]) -> [f64; 3] {
         for _ in 0..4 {
             let (value, gradient) = self.at_with_gradient(point);
-            let step = value / gradient.iter().map(|v| v * v).sum::<f64>();
+            let [x, y, z] = gradient;
+            let step = value / (x * x + y * y + z * z);
             if !step.is_finite() {
                 break;
             }
@@ -158,11 +164,16 @@ impl Tunnel {
         let corner = |corner: usize, waist: &Waist| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
         // On the ring the interpolant is about 0. What the tunnel goes around is farthest from that.
         let value = |end: usize| field.at_with_gradient(corner(end, &waist)).0;
-        let through = |end: usize| value(end) + value(end ^ 7);
-        let end = (0..4).max_by(|&a, &b| through(a).abs().total_cmp(&through(b).abs()))?;
-        let joined = joined_loops(case, loops, through(end) < 0.0)?;
+        let (mut end, mut through) = (0, 0.0f64);
+        for other in 0..4 {
+            let value = value(other) + value(other ^ 7);
+            if value.abs() >= through.abs() {
+                (end, through) = (other, value);
+            }
+        }
+        let joined = joined_loops(case, loops, through < 0.0)?;
 
-        let corners = ring(end).map(|end| straightened(corner(end, &waist), &waist));
+        let corners = ring(end).map(straightened_corner);
         let names = core::array::from_fn(|index| FIRST_INTERIOR + index as u8);
         let (mut corners_backward, mut names_backward): ([[f64; 3]; RING], [u8; RING]) = (corners, names);
         corners_backward.reverse();
@@ -171,8 +182,9 @@ impl Tunnel {
         let strip_to = |number: usize| {
             let (mut around, mut around_names) = ([[0.0; 3]; 12], [0; 12]);
             let edges = loops.get(number);
-            for (index, &edge) in edges.iter().enumerate() {
-                (around[index], around_names[index]) = (straightened(field.crossing(edge), &waist), edge.index() as u8);
+            for ((point, name), &edge) in around.iter_mut().zip(&mut around_names).zip(edges) {
+                *point = straightened_crossing(edge, field.crossing_along(edge), &waist);
+                *name = edge.index() as u8;
             }
             let around = &around[..edges.len()];
             let forward = turn(around, end) * ring_turn > 0.0;
@@ -195,13 +207,14 @@ impl Tunnel {
 /// How points of a straightened cell, joined in order, turn around the cell's diagonal from corner `end`: positive one way,
 /// negative the other.
 fn turn(points: &[[f64; 3]], end: usize) -> f64 {
-    let from_middle = |index: usize| points[index % points.len()].map(|v| v - 1.5);
     let diagonal: [f64; 3] = core::array::from_fn(|axis| if end >> axis & 1 == 1 { -1.0 } else { 1.0 });
-    let area = |index: usize| {
-        let ([a, b, c], [d, e, f]) = (from_middle(index), from_middle(index + 1));
-        diagonal[0] * (b * f - c * e) + diagonal[1] * (c * d - a * f) + diagonal[2] * (a * e - b * d)
-    };
-    (0..points.len()).map(area).sum()
+    let (mut sum, mut last) = (0.0, points[points.len() - 1].map(|v| v - 1.5));
+    for point in points {
+        let ([a, b, c], [d, e, f]) = (last, point.map(|v| v - 1.5));
+        sum += diagonal[0] * (b * f - c * e) + diagonal[1] * (c * d - a * f) + diagonal[2] * (a * e - b * d);
+        last = [d, e, f];
+    }
+    sum
 }
 
 /// The two loops that a tunnel joins. `goes_around_inside`: what is within the tunnel.

@@ -12,15 +12,15 @@
 //! Between the ring and each of the two loops lies a strip of triangles. Which corner of the ring belongs to which
 //! crossing is told by the order of things along the axes, not by distances: strips of the shortest lines in the cell
 //! as it is cross each other in 2 to 20 % of all tunnels, those of the least area in 14 to 58 %; strips of the shortest
-//! lines in the cell [`straightened`] were not seen to. (Random cells, the first figures with weights of one magnitude,
-//! the second with weights six apart.)
+//! lines in the cell [straightened](straightened_crossing) were not seen to. (Random cells, the first figures with
+//! weights of one magnitude, the second with weights six apart.)
 //!
 //! Two roots may be as close as floating point allows. The ring's corners are kept apart and away from the faces, and
 //! since its sides run along the axes, none can be in line with a crossing on an edge: no triangle has zero area.
 
 #[cfg(doc)]
 use crate::simd::Simd;
-use crate::{math::sqrt_f64, mesher::vertices::MARGIN};
+use crate::{cell::Edge, math::sqrt_f64, mesher::vertices::MARGIN};
 
 /// The box around a tunnel's waist: from and to, per axis, in the cell's coordinates.
 pub(super) type Waist = [[f64; 2]; 3];
@@ -121,20 +121,25 @@ pub(super) const fn ring(end: usize) -> [usize; RING] {
     [end ^ 1, end ^ 3, end ^ 2, end ^ 6, end ^ 4, end ^ 5]
 }
 
-/// Where a point of the cell would be if the cell were 3 long, with the waist in its middle third. What has to be joined
+/// Where a corner of the box would be if the cell were 3 long, with the waist in its middle third. What has to be joined
 /// with what depends on the order of things along the axes alone, and is plain to see there however thin the waist is.
-pub(super) fn straightened(point: [f64; 3], waist: &Waist) -> [f64; 3] {
-    core::array::from_fn(|axis| {
-        let ([from, to], at) = (waist[axis], point[axis]);
-        let (third, [start, end]) = if at < from {
-            (0.0, [0.0, from])
-        } else if at <= to {
-            (1.0, [from, to])
-        } else {
-            (2.0, [to, 1.0])
-        };
-        third + (at - start) / (end - start)
-    })
+pub(super) fn straightened_corner(corner: usize) -> [f64; 3] {
+    core::array::from_fn(|axis| 1.0 + (corner >> axis & 1) as f64)
+}
+
+/// The same for the crossing on an edge. `at`: its coordinate along the edge.
+pub(super) fn straightened_crossing(edge: Edge, at: f64, waist: &Waist) -> [f64; 3] {
+    let [from, to] = waist[edge.axis()];
+    let (third, [start, end]) = if at < from {
+        (0.0, [0.0, from])
+    } else if at <= to {
+        (1.0, [from, to])
+    } else {
+        (2.0, [to, 1.0])
+    };
+    let mut point = edge.corners()[0].offset().map(|v| 3.0 * f64::from(v));
+    point[edge.axis()] = third + (at - start) / (end - start);
+    point
 }
 
 /// Joins a loop of crossings to the ring, both given in the same sense of rotation: the triangles between them with the
@@ -155,11 +160,19 @@ pub(super) fn strip(
     let (mut sums, mut along) = ([f64::INFINITY; RING + 1], [[false; RING + 1]; MOST + 1]);
     for i in 0..=len {
         let mut after_ring = f64::INFINITY;
+        let distances = &distances[if i < len { i } else { 0 }];
         for j in 0..=RING {
             let after_loop = sums[j];
-            let before = if i + j == 0 { 0.0 } else { after_loop.min(after_ring) };
-            along[i][j] = j == 0 || i > 0 && after_loop <= after_ring;
-            after_ring = before + distances[i % len][(start + j) % RING];
+            let by_loop = after_loop <= after_ring;
+            along[i][j] = j == 0 || i > 0 && by_loop;
+            let before = if i + j == 0 {
+                0.0
+            } else if by_loop {
+                after_loop
+            } else {
+                after_ring
+            };
+            after_ring = before + distances[(start + j) % RING];
             sums[j] = after_ring;
         }
     }
