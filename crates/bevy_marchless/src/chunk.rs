@@ -8,12 +8,12 @@ use bevy_ecs::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::MeshBuffer;
+use marchless::{MeshBuffer, Region};
 
 /// One chunk of a terrain, on an entity of its own, a child of the terrain.
 ///
-/// The plugin spawns these and gives each its place, its `Aabb` and, where there is something to draw, a
-/// `Mesh3d`. Samples live in the terrain's [`TerrainVolume`](crate::terrain::TerrainVolume). Despawning one ends its drawing, not its samples.
+/// The plugin spawns these where there is something to draw, and gives each its place, its `Aabb` and its `Mesh3d`.
+/// Samples live in the terrain's [`TerrainVolume`](crate::terrain::TerrainVolume). Despawning one ends its drawing, not its samples.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Component, Debug, PartialEq, Hash, Clone)]
 #[component(immutable)]
@@ -21,8 +21,32 @@ use marchless::MeshBuffer;
 pub struct Chunk {
     /// The terrain it belongs to.
     pub terrain: Entity,
-    /// Its place in the terrain, in chunks; 0 on each axis is the lowest.
+    /// The level of detail that it is drawn in; 0 is the finest, and at present there is no other.
+    pub level: u8,
+    /// Its place in the terrain, in chunks of its level; may be negative.
     pub position: IVec3,
+}
+
+/// Which chunk of which level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct ChunkKey {
+    pub(crate) level: u8,
+    pub(crate) position: [i32; 3],
+}
+
+impl ChunkKey {
+    /// A chunk of the finest level.
+    pub(crate) const fn finest(position: [i32; 3]) -> Self {
+        Self { level: 0, position }
+    }
+
+    /// The 3 × 3 × 3 chunks around it, itself included, of the same level.
+    #[expect(dead_code, reason = "what streams uses it")]
+    pub(crate) fn around(self) -> impl Iterator<Item = Self> {
+        let Self { level, position } = self;
+        let region = Region::new(position.map(|v| v.saturating_sub(1)), position.map(|v| v.saturating_add(2)));
+        region.points().map(move |position| Self { level, position })
+    }
 }
 
 /// What a chunk looks like at the moment: the mesh in voxels from the chunk's lowest corner, without any renderer.
@@ -37,20 +61,24 @@ pub struct ChunkGeometry {
     pub mesh: Arc<MeshBuffer>,
 }
 
-/// The bundle of a chunk that has not been meshed yet.
-pub(crate) fn new_chunk(terrain: Entity, position: [i32; 3], cells: u32, voxel_size: f32) -> impl Bundle {
+/// The bundle of a chunk without its mesh.
+pub(crate) fn new_chunk(
+    terrain: Entity,
+    ChunkKey { level, position }: ChunkKey,
+    cells: u32,
+    voxel_size: f32,
+) -> impl Bundle {
     (
-        Chunk { terrain, position: position.into() },
+        Chunk { terrain, level, position: position.into() },
         chunk_transform(position, cells, voxel_size),
-        chunk_bounds([cells; 3]),
         ChildOf(terrain),
     )
 }
 
 /// From a chunk's own space, in voxels, to the terrain's.
 pub(crate) fn chunk_transform(position: [i32; 3], cells: u32, voxel_size: f32) -> Transform {
-    let corner = IVec3::from(position) * cells as i32;
-    Transform::from_translation(corner.as_vec3() * voxel_size).with_scale(Vec3::splat(voxel_size))
+    let corner = IVec3::from(position).as_dvec3() * f64::from(cells) * f64::from(voxel_size);
+    Transform::from_translation(corner.as_vec3()).with_scale(Vec3::splat(voxel_size))
 }
 
 /// The box of a whole chunk, in voxels.

@@ -33,6 +33,14 @@ impl DebugPlugin {
     pub const EDIT_UPDATES: DiagnosticPath = DiagnosticPath::const_new("marchless/edit_updates");
     /// How long after its stamp was read an edit was shown, in milliseconds.
     pub const EDIT_TIME: DiagnosticPath = DiagnosticPath::const_new("marchless/edit_time");
+    /// How many chunks in range wait for their samples or their mesh.
+    pub const WAITING_CHUNKS: DiagnosticPath = DiagnosticPath::const_new("marchless/waiting_chunks");
+    /// How long the plugin's systems took in an update, in milliseconds.
+    pub const MAIN_THREAD: DiagnosticPath = DiagnosticPath::const_new("marchless/main_thread");
+    /// How much memory samples and geometry take, in bytes; measured every 64 updates.
+    pub const RESIDENT_BYTES: DiagnosticPath = DiagnosticPath::const_new("marchless/resident_bytes");
+    /// The same, divided by how many chunks have something to draw.
+    pub const BYTES_PER_SURFACE_CHUNK: DiagnosticPath = DiagnosticPath::const_new("marchless/bytes_per_surface_chunk");
 }
 
 impl Plugin for DebugPlugin {
@@ -45,6 +53,10 @@ impl Plugin for DebugPlugin {
             (Self::MESH_TIME, "ms"),
             (Self::EDIT_UPDATES, ""),
             (Self::EDIT_TIME, "ms"),
+            (Self::WAITING_CHUNKS, ""),
+            (Self::MAIN_THREAD, "ms"),
+            (Self::RESIDENT_BYTES, "B"),
+            (Self::BYTES_PER_SURFACE_CHUNK, "B"),
         ] {
             app.register_diagnostic(Diagnostic::new(path).with_suffix(suffix));
         }

@@ -58,6 +58,7 @@ pub mod query;
 pub mod schedule;
 pub mod source;
 mod stats;
+pub mod stream;
 pub mod terrain;
 mod work;
 
@@ -80,7 +81,8 @@ pub mod prelude {
     pub use crate::query::{TerrainHit, TerrainQuery};
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
     pub use crate::source::*;
-    pub use crate::terrain::{Palette, SourceHandle, Terrain, TerrainError, TerrainVolume};
+    pub use crate::stream::{Coverage, Leaf, LeafState, StreamStats, TerrainViewer};
+    pub use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainError, TerrainVolume};
     pub use marchless::Region;
     pub use marchless::bits::BitGrid;
 }

@@ -1,5 +1,7 @@
 //! [`MarchlessSystems`]: what the plugin does in an update, in order, and [`MarchlessSettings`], how much of it at once.
 
+use core::time::Duration;
+
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_asset::AssetEventSystems;
 use bevy_ecs::prelude::*;
@@ -51,6 +53,15 @@ pub struct MarchlessSettings {
     /// A group of at most so many chunks is meshed within the update that changed it; a larger one in tasks, to be
     /// shown updates later. Unit: chunks with a surface. Default 8: what a small stamp at a corner of chunks touches.
     pub inline_chunks: usize,
+    /// How many chunks may be on their way through the jobs that sample and mesh them for the first time, for each thread
+    /// of the pool: few, so that what is seen first comes first; enough for an update. At least 1. Default 64.
+    pub chunks_in_flight: usize,
+    /// So many bytes of new meshes are shown per update, and one chunk more, so that the graphics card is not flooded;
+    /// edits are shown at once whatever their size. Default 4 MiB.
+    pub upload_bytes: usize,
+    /// How long the main thread may load and unload chunks per update; what is left waits. Each update does some. Default:
+    /// half a millisecond.
+    pub main_thread: Duration,
     /// Without threads: how many chunks may be sampled or meshed per update, on the main thread; `Some(0)` lets them all
     /// wait, and only what `inline_chunks` allows is meshed. `None`: in tasks,
     /// as many at once as the pool of asynchronous tasks has threads. Default: 8 on the web, `None` elsewhere; also 8 where there is no such pool.
@@ -59,7 +70,13 @@ pub struct MarchlessSettings {
 
 impl Default for MarchlessSettings {
     fn default() -> Self {
-        Self { inline_chunks: 8, budget: cfg!(target_arch = "wasm32").then_some(8) }
+        Self {
+            inline_chunks: 8,
+            chunks_in_flight: 64,
+            upload_bytes: 4 << 20,
+            main_thread: Duration::from_micros(500),
+            budget: cfg!(target_arch = "wasm32").then_some(8),
+        }
     }
 }
 

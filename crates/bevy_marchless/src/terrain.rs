@@ -1,5 +1,6 @@
 //! [`Terrain`]: a terrain's settings and source; give it to an entity, and chunks appear.
 
+mod extent;
 mod fill;
 mod prepare;
 mod volume;
@@ -11,11 +12,13 @@ use bevy_app::{App, Plugin, PostUpdate};
 use bevy_camera::visibility::Visibility;
 use bevy_color::{Color, ColorToComponents as _, LinearRgba};
 use bevy_ecs::prelude::*;
-use bevy_math::{UVec3, Vec3};
+use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{DEFAULT_CHUNK_CELLS, MeshSettings, Source};
+use marchless::{DEFAULT_CHUNK_CELLS, MeshSettings, Region, Source};
 use thiserror::Error;
+
+pub use extent::{Extent, Keep};
 
 pub(crate) use fill::distance_to_middle;
 pub(crate) use prepare::prepare_terrains;
@@ -26,13 +29,16 @@ use crate::chunk::{Chunk, ChunkGeometry};
 use crate::schedule::MarchlessSystems;
 use crate::source::Air;
 
-/// A terrain of a fixed extent, its settings and what it is made of.
+/// A terrain, its settings and what it is made of.
 ///
-/// Samples lie on a lattice, one voxel apart; the terrain's origin is its lowest corner. The
+/// Samples lie on a lattice, one voxel apart; the terrain's origin is lattice point 0, the lowest corner of chunk 0. The
 /// entity's `Transform` moves, turns and scales the whole terrain; several terrains may live side by side.
 ///
-/// Changing `source`, `extent`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone; changing the
-/// other settings only meshes it anew. Settings out of range are refused with an error in the log and a
+/// A terrain [of a fixed extent](Terrain::new) is loaded as a whole; an [endless](Terrain::endless) one where a
+/// [`TerrainViewer`](crate::stream::TerrainViewer) is near.
+///
+/// Changing `source`, `extent`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone; changing
+/// `keep` loads and unloads chunks, and changing the other settings only meshes the terrain anew. Settings out of range are refused with an error in the log and a
 /// [`TerrainError`] component; those before them stay in effect.
 ///
 /// Outside of its extent there is air, so that its surface is closed, with flat walls at its border.
@@ -52,8 +58,10 @@ use crate::source::Air;
 #[reflect(Component, Default, Debug, Clone)]
 #[require(Transform, Visibility, TerrainVolume)]
 pub struct Terrain {
-    /// How large it is, in chunks; at least 1 an axis, at most [`Terrain::MAX_CHUNKS`] in all. Default 8 × 4 × 8.
-    pub extent: UVec3,
+    /// Which chunks it has; at least 1 an axis. Default: 8 × 4 × 8 from chunk 0 on.
+    pub extent: Extent,
+    /// Which of them are loaded whoever looks; at most [`Terrain::MAX_CHUNKS`]. Default: all.
+    pub keep: Keep,
     /// Cells of a chunk per axis, 8 to 62. Default 32.
     pub chunk_cells: u32,
     /// The distance between two samples, in world units; above 0. Default 1.
@@ -72,13 +80,14 @@ pub struct Terrain {
 }
 
 impl Terrain {
-    /// The most chunks that a terrain may have.
+    /// The most chunks that a terrain may keep loaded, and that may be loaded around a viewer.
     pub const MAX_CHUNKS: u64 = 65_536;
 
     /// A terrain made of `source`, with the default settings.
     pub fn new(source: impl Source) -> Self {
         Self {
-            extent: UVec3::new(8, 4, 8),
+            extent: UVec3::new(8, 4, 8).into(),
+            keep: Keep::Everything,
             chunk_cells: DEFAULT_CHUNK_CELLS,
             voxel_size: 1.0,
             isovalue: 0.0,
@@ -88,10 +97,21 @@ impl Terrain {
         }
     }
 
-    /// The same terrain, so many chunks large.
+    /// A terrain without any border, made of `source`, loaded where viewers are near.
+    pub fn endless(source: impl Source) -> Self {
+        Self { extent: Extent::ENDLESS, keep: Keep::Nothing, ..Self::new(source) }
+    }
+
+    /// The same terrain with these chunks: so many from chunk 0 on, or an [`Extent`].
     #[must_use]
-    pub fn with_extent(self, extent: UVec3) -> Self {
-        Self { extent, ..self }
+    pub fn with_extent(self, extent: impl Into<Extent>) -> Self {
+        Self { extent: extent.into(), ..self }
+    }
+
+    /// The same terrain with these chunks loaded whoever looks.
+    #[must_use]
+    pub fn with_keep(self, keep: Keep) -> Self {
+        Self { keep, ..self }
     }
 
     /// The same terrain with chunks of so many cells per axis.
@@ -134,9 +154,9 @@ impl Terrain {
         self.set_source(Air);
     }
 
-    /// How large the terrain is, in voxels per axis.
+    /// How large the terrain is, in voxels per axis; saturates where it is endless.
     pub fn size_in_voxels(&self) -> UVec3 {
-        self.extent.saturating_mul(UVec3::splat(self.chunk_cells))
+        self.extent.size().saturating_mul(UVec3::splat(self.chunk_cells))
     }
 
     /// How large the terrain is in its own space, in world units per axis.
@@ -149,12 +169,15 @@ impl Terrain {
     /// # Errors
     /// [`TerrainError`] about the first that is not.
     pub fn check(&self) -> Result<(), TerrainError> {
-        let chunks = self.extent.to_array().map(u64::from).into_iter().try_fold(1, u64::checked_mul);
-        if !chunks.is_some_and(|chunks| (1..=Self::MAX_CHUNKS).contains(&chunks)) {
-            return Err(TerrainError::Extent { found: self.extent });
-        }
         if marchless::Grid::<i16>::new(self.chunk_cells).is_err() {
             return Err(TerrainError::ChunkCells { found: self.chunk_cells });
+        }
+        if self.chunk_region().is_empty() {
+            return Err(TerrainError::Extent { min: self.extent.min, max: self.extent.max });
+        }
+        let kept = self.kept_region().size().into_iter().map(u128::from).product::<u128>();
+        if kept > u128::from(Self::MAX_CHUNKS) {
+            return Err(TerrainError::Keep { found: u64::try_from(kept).unwrap_or(u64::MAX) });
         }
         if !(self.voxel_size > 0.0 && self.voxel_size.is_finite()) {
             return Err(TerrainError::VoxelSize { found: self.voxel_size });
@@ -163,6 +186,16 @@ impl Terrain {
             return Err(TerrainError::Isovalue { found: self.isovalue });
         }
         Ok(())
+    }
+
+    /// The chunks that it has.
+    pub(crate) fn chunk_region(&self) -> Region {
+        self.extent.region(self.chunk_cells)
+    }
+
+    /// The chunks that are loaded whoever looks.
+    pub(crate) fn kept_region(&self) -> Region {
+        self.keep.region(self.chunk_region(), self.chunk_cells)
     }
 
     pub(crate) fn mesh_settings(&self) -> MeshSettings {
@@ -182,11 +215,22 @@ impl Default for Terrain {
 #[reflect(Component, Debug, PartialEq, Clone)]
 #[non_exhaustive]
 pub enum TerrainError {
-    /// No chunk, or too many.
-    #[error("a terrain's extent must be 1 to {} chunks in all, but it is {found}", Terrain::MAX_CHUNKS)]
+    /// No chunk.
+    #[error("a terrain's extent must hold at least one chunk that can be addressed, but it is {min} to {max}")]
     Extent {
-        /// What was given, in chunks.
-        found: UVec3,
+        /// Its lowest chunk.
+        min: IVec3,
+        /// One past its highest chunk.
+        max: IVec3,
+    },
+    /// Too many chunks at once.
+    #[error(
+        "a terrain must keep at most {} chunks loaded, but `keep` and `extent` ask for {found}; keep fewer and let viewers load the others",
+        Terrain::MAX_CHUNKS
+    )]
+    Keep {
+        /// How many that would be.
+        found: u64,
     },
     /// Chunks too small or too large.
     #[error("a chunk must have 8 to 62 cells per axis, but `chunk_cells` is {found}")]
@@ -310,6 +354,11 @@ impl Plugin for TerrainPlugin {
             .register_type::<crate::query::TerrainHit>()
             .register_type::<TerrainError>()
             .register_type::<Chunk>()
+            .register_type::<crate::stream::TerrainViewer>()
+            .register_type::<crate::stream::Leaf>()
+            .register_type::<crate::stream::Coverage>()
+            .register_type::<crate::stream::StreamStats>()
+            .init_resource::<crate::stream::StreamStats>()
             .register_type::<ChunkGeometry>()
             .init_resource::<fill::FillResults>()
             .add_observer(prepare::forget_despawned_chunk)

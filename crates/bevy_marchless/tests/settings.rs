@@ -65,7 +65,7 @@ fn changed_settings_take_effect() {
     assert!(geometry(&mut app, terrain).iter().all(|(_, mesh)| mesh.normals.is_empty()));
     change(&mut app, |terrain| terrain.palette = Palette::new([bevy_color::Color::BLACK]));
     change(&mut app, |terrain| terrain.voxel_size = 2.0);
-    change(&mut app, |terrain| terrain.extent = UVec3::new(1, 3, 2));
+    change(&mut app, |terrain| terrain.extent = UVec3::new(1, 3, 2).into());
     assert_eq!(geometry(&mut app, terrain).len(), 6);
     change(&mut app, |terrain| terrain.chunk_cells = 20);
     change(&mut app, Terrain::clear);

@@ -139,16 +139,30 @@ impl<W: Weight> Grid<W> {
     /// # Errors
     /// [`GridError::OutOfBounds`], and [`GridError::SamplesLength`] where the chunk is of another size; nothing is
     /// changed then.
-    pub fn insert(&mut self, position: [i32; 3], mut chunk: Chunk<W>) -> Result<(), GridError> {
+    pub fn insert(&mut self, position: [i32; 3], chunk: Chunk<W>) -> Result<(), GridError> {
+        self.load(position, chunk)?;
+        self.mark_dirty(self.chunk_region(position));
+        Ok(())
+    }
+
+    /// The same for a chunk of which, with its neighbours, no mesh is out of date: nothing is marked dirty.
+    ///
+    /// # Errors
+    /// As [`Grid::insert`].
+    pub fn load(&mut self, position: [i32; 3], mut chunk: Chunk<W>) -> Result<(), GridError> {
         chunk.check(self.cells)?;
         self.check(position)?;
-        let region = self.chunk_region(position);
+        let origin = self.chunk_region(position).min;
         if let Some(border) = self.border() {
-            chunk.clip(region.min, self.cells, &border);
+            chunk.clip(origin, self.cells, &border);
         }
         self.chunks.insert(position, chunk);
-        self.mark_dirty(region);
         Ok(())
+    }
+
+    /// Takes the chunk at `position` out and marks nothing dirty.
+    pub fn unload(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
+        self.chunks.remove(&position)
     }
 
     /// Samples `source` for the chunk at `position` ([`Chunk::from_source`]) and puts it there. `spacing`: world units
@@ -292,10 +306,13 @@ impl<W: Weight> Grid<W> {
 
     /// The chunk positions that may be present: the bounds, or all whose blocks fit in `i32`.
     fn limits(&self) -> Region {
-        self.bounds.unwrap_or_else(|| {
-            let end = (i32::MAX - 2) / self.cells as i32;
-            Region::new([-end; 3], [end; 3])
-        })
+        self.bounds.unwrap_or_else(|| Self::largest(self.cells))
+    }
+
+    /// All chunk positions that there can be in a grid: those whose blocks fit in `i32`. `chunk_cells`: 8 to 62, clamped.
+    pub fn largest(chunk_cells: u32) -> Region {
+        let end = (i32::MAX - 2) / chunk_cells.clamp(MIN_CHUNK_CELLS, MAX_CHUNK_CELLS) as i32;
+        Region::new([-end; 3], [end; 3])
     }
 }
 

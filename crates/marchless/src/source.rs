@@ -98,6 +98,14 @@ pub trait Source: Send + Sync + 'static {
         let _ = region;
         Bound::Mixed
     }
+
+    /// The same, asked where sampling comes next: an answer may cost about as much as one layer of samples.
+    ///
+    /// Whoever streams chunks asks for [`Source::bound`] on the thread that must not wait, of single chunks and of larger
+    /// boxes; and for this one in the job that samples.
+    fn bound_closely(&self, region: &SourceRegion) -> Bound {
+        self.bound(region)
+    }
 }
 
 /// World position (terrain space) to signed distance in world units; material 0.
@@ -124,6 +132,10 @@ macro_rules! forward {
 
             fn bound(&self, region: &SourceRegion) -> Bound {
                 (**self).bound(region)
+            }
+
+            fn bound_closely(&self, region: &SourceRegion) -> Bound {
+                (**self).bound_closely(region)
             }
         }
     };

@@ -7,7 +7,7 @@ use bevy_gizmos::AppGizmoBuilder as _;
 use bevy_gizmos::GizmoPlugin;
 use bevy_gizmos::config::GizmoConfigGroup;
 use bevy_gizmos::gizmos::Gizmos;
-use bevy_math::{Vec3, bounding::Aabb3d};
+use bevy_math::{IVec3, Vec3, bounding::Aabb3d};
 use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
 use bevy_transform::components::GlobalTransform;
@@ -66,7 +66,9 @@ fn draw_bounds(
     }
     for (volume, transform) in &terrains {
         if let Some(settings) = volume.settings() {
-            gizmos.aabb_3d(cuboid(settings.size()), *transform, whole);
+            let corner = |chunk: IVec3| chunk.as_vec3() * settings.chunk_cells as f32 * settings.voxel_size;
+            let bounds = Aabb3d::from_min_max(corner(settings.extent.min), corner(settings.extent.max));
+            gizmos.aabb_3d(bounds, *transform, whole);
         }
     }
 }

@@ -41,8 +41,8 @@ pub(crate) fn fill_chunk(
 
 /// The squared distance from a chunk to the middle of the terrain, in half chunks.
 pub(crate) fn distance_to_middle(terrain: &Terrain, position: [i32; 3]) -> u32 {
-    let extent = terrain.extent.to_array();
-    (0..3).map(|axis| (2 * position[axis] + 1).abs_diff(extent[axis] as i32).pow(2)).sum()
+    let kept = terrain.kept_region();
+    (0..3).map(|axis| (2 * position[axis] + 1).abs_diff(kept.min[axis] + kept.max[axis]).pow(2)).sum()
 }
 
 /// Takes sampled chunks into their volumes, with the stamps that came before them.

@@ -63,7 +63,9 @@ fn lay_out(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, comman
         commands.entity(old).try_despawn();
     }
     for position in extent.points() {
-        let chunk = commands.spawn(new_chunk(entity, position, terrain.chunk_cells, terrain.voxel_size)).id();
+        let chunk = commands
+            .spawn(new_chunk(entity, crate::chunk::ChunkKey::finest(position), terrain.chunk_cells, terrain.voxel_size))
+            .id();
         volume.chunks.insert(position, ChunkState::new(position, extent, Some(chunk)));
     }
     volume.shown = empty_grid(terrain);
@@ -123,9 +125,9 @@ fn same_meshes(a: &Terrain, b: &Terrain) -> bool {
 }
 
 fn extent_of(terrain: &Terrain) -> Region {
-    Region::new([0; 3], terrain.extent.as_ivec3().to_array())
+    terrain.kept_region()
 }
 
 fn empty_grid(terrain: &Terrain) -> Grid<i16> {
-    Grid::bounded(terrain.chunk_cells, extent_of(terrain)).expect("the settings have been checked")
+    Grid::bounded(terrain.chunk_cells, terrain.chunk_region()).expect("the settings have been checked")
 }

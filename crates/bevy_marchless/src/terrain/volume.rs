@@ -12,6 +12,7 @@ use super::Terrain;
 use crate::bits::BitsCache;
 use crate::mesh::{Colors, Meshed};
 use crate::stats::Since;
+use crate::stream::{Coverage, Leaf, LeafState};
 use crate::work::{Ticket, new_number};
 
 /// A terrain's samples. The plugin fills and changes them; read them here, change them with
@@ -149,6 +150,30 @@ impl TerrainVolume {
     /// The entity of the chunk at `position`, in chunks.
     pub fn chunk_entity(&self, position: IVec3) -> Option<Entity> {
         self.chunks.get(&position.to_array())?.entity
+    }
+
+    /// What is shown of the chunk at a place, in chunks; `None` where it is in no range.
+    pub fn leaf_at(&self, position: IVec3) -> Option<Leaf> {
+        let state = self.chunks.get(&position.to_array())?;
+        let state = match (state.drawn, state.empty) {
+            (false, _) => LeafState::Waiting,
+            (true, true) => LeafState::Empty,
+            (true, false) => LeafState::Drawn,
+        };
+        Some(Leaf { level: 0, position, state })
+    }
+
+    /// How many leaves of each state there are.
+    pub fn coverage(&self) -> Coverage {
+        let mut coverage = Coverage::default();
+        for leaf in self.chunks.keys().filter_map(|position| self.leaf_at(IVec3::from(*position))) {
+            match leaf.state {
+                LeafState::Waiting => coverage.waiting += 1,
+                LeafState::Empty => coverage.empty += 1,
+                LeafState::Drawn => coverage.drawn += 1,
+            }
+        }
+        coverage
     }
 
     /// Whether all chunks have their samples.

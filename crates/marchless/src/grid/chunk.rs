@@ -37,24 +37,63 @@ impl<W: Weight> Chunk<W> {
 
     /// Samples `source` for the chunk at chunk position `position`; runs on any thread.
     ///
-    /// The source is asked for a bound first, of the chunk and four points around it: then the distances that are left
-    /// out are too far from the surface to matter to it, for isovalues within ±3 voxels. `cells`: 8 to 62, clamped.
-    /// `spacing`: world units per voxel. A position whose lattice points do not fit in `i32` gives the chunk nearest to
-    /// it; no grid takes it.
+    /// The source is asked for a [close bound](Source::bound_closely) first, of the chunk and four points around it: then
+    /// the distances that are left out are too far from the surface to matter to it, for isovalues within ±3 voxels.
+    /// `cells`: 8 to 62, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit in `i32`
+    /// gives the chunk nearest to it; no grid takes it.
     pub fn from_source(source: &(impl Source + ?Sized), position: [i32; 3], cells: u32, spacing: f64) -> Self {
-        let cells = cells.clamp(MIN_CHUNK_CELLS, MAX_CHUNK_CELLS);
-        let min = position.map(|v| v.saturating_mul(cells as i32));
-        let region = SourceRegion { min, size: [cells; 3], level: 0, spacing };
-        match source.bound(&region.grown(BOUND_MARGIN)) {
-            Bound::Inside { material } => Self::Uniform(Voxel::new(W::INSIDE, material)),
-            Bound::Outside => Self::AIR,
-            Bound::Mixed => {
-                let mut distances = vec![0.0; region.len()];
-                let mut materials = vec![0; region.len()];
-                source.fill(&region, &mut distances, &mut materials);
-                Self::collapsed(distances.into_iter().map(W::from_voxels).collect(), materials)
-            }
+        Self::from_source_counted(source, position, cells, spacing).0
+    }
+
+    /// The chunk at `position` where `source` is certain of it [without sampling](Source::bound); arguments as of
+    /// [`Chunk::from_source`].
+    pub fn without_sampling(
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        cells: u32,
+        spacing: f64,
+    ) -> Option<Self> {
+        Self::box_without_sampling(source, position, 1, cells, spacing)
+    }
+
+    /// The same for all chunks of a box: `chunks` per axis, `position` the lowest. They are all alike then.
+    pub fn box_without_sampling(
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        chunks: u32,
+        cells: u32,
+        spacing: f64,
+    ) -> Option<Self> {
+        Self::from_bound(source.bound(&source_region(position, chunks, cells, spacing).grown(BOUND_MARGIN)))
+    }
+
+    /// The chunk at `position`, and whether it took sampling; arguments as of [`Chunk::from_source`], whose result it is.
+    pub fn from_source_counted(
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        cells: u32,
+        spacing: f64,
+    ) -> (Self, bool) {
+        let region = source_region(position, 1, cells, spacing);
+        match Self::from_bound(source.bound_closely(&region.grown(BOUND_MARGIN))) {
+            Some(chunk) => (chunk, false),
+            None => (Self::sampled(source, &region), true),
         }
+    }
+
+    fn from_bound(bound: Bound) -> Option<Self> {
+        match bound {
+            Bound::Inside { material } => Some(Self::Uniform(Voxel::new(W::INSIDE, material))),
+            Bound::Outside => Some(Self::AIR),
+            Bound::Mixed => None,
+        }
+    }
+
+    fn sampled(source: &(impl Source + ?Sized), region: &SourceRegion) -> Self {
+        let mut distances = vec![0.0; region.len()];
+        let mut materials = vec![0; region.len()];
+        source.fill(region, &mut distances, &mut materials);
+        Self::collapsed(distances.into_iter().map(W::from_voxels).collect(), materials)
     }
 
     /// A chunk of `cells` cells per axis from its samples, uniform where they are all equal.
@@ -130,6 +169,13 @@ impl<W: Weight> Chunk<W> {
             _ => Self::Samples(Arc::new(ChunkSamples { weights, materials })),
         }
     }
+}
+
+/// The lattice points of a box of chunks.
+fn source_region(position: [i32; 3], chunks: u32, cells: u32, spacing: f64) -> SourceRegion {
+    let cells = cells.clamp(MIN_CHUNK_CELLS, MAX_CHUNK_CELLS);
+    let min = position.map(|v| v.saturating_mul(cells as i32));
+    SourceRegion { min, size: [cells.saturating_mul(chunks); 3], level: 0, spacing }
 }
 
 fn check_lengths<W>(weights: &[W], materials: &[u8], cells: u32) -> Result<(), GridError> {
