@@ -22,10 +22,14 @@
 //! Sources are floating point: they promise the same samples on the same machine and build, and nothing across
 //! machines.
 
+#[cfg(feature = "noise")]
+mod fractal;
 #[cfg(any(feature = "noise", feature = "png"))]
 mod height_field;
 #[cfg(feature = "png")]
 mod height_map;
+#[cfg(feature = "noise")]
+mod landscape;
 #[cfg(feature = "noise")]
 mod noise;
 mod sdf;
@@ -36,11 +40,15 @@ use bevy_app::App;
 use bevy_reflect::Reflect;
 use thiserror::Error;
 
+#[cfg(feature = "noise")]
+pub use fractal::Fractal;
 #[cfg(feature = "png")]
 pub use height_map::{HeightMap, HeightMapError, HeightMapSettings};
+#[cfg(feature = "noise")]
+pub use landscape::{Caves, Landscape, LandscapeSettings, Layer, MaterialRule, Patches, Solid, Tunnels};
 pub use marchless::{Bound, Source, SourceRegion};
 #[cfg(feature = "noise")]
-pub use noise::{Fractal, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings};
+pub use noise::{NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings};
 pub use sdf::Sdf;
 #[cfg(any(feature = "noise", feature = "png"))]
 pub use strata::Stratum;
@@ -73,6 +81,12 @@ pub enum SourceError {
         expected: &'static str,
         /// What was given.
         found: f64,
+    },
+    /// Layers or solids are nested too deeply.
+    #[error("layers and solids must be nested at most {most} deep, but they are deeper")]
+    Nested {
+        /// How deep they may be.
+        most: u32,
     },
 }
 
@@ -133,7 +147,15 @@ pub(crate) fn register_types(app: &mut App) {
         .register_type::<NoiseHeights>()
         .register_type::<NoiseHeightsSettings>()
         .register_type::<NoiseDensity>()
-        .register_type::<NoiseDensitySettings>();
+        .register_type::<NoiseDensitySettings>()
+        .register_type::<Layer>()
+        .register_type::<Solid>()
+        .register_type::<Caves>()
+        .register_type::<Tunnels>()
+        .register_type::<MaterialRule>()
+        .register_type::<Patches>()
+        .register_type::<LandscapeSettings>()
+        .register_type::<Landscape>();
     #[cfg(feature = "png")]
     app.register_type::<HeightMap>().register_type::<HeightMapSettings>();
 }

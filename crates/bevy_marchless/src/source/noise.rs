@@ -7,46 +7,7 @@ use marchless::{Bound, Source, SourceRegion};
 
 use super::height_field::{self, Column, HeightField};
 use super::strata::{Stratum, material_at};
-use super::{ROOM, SourceError, check, check_length, check_position, rows, world_box};
-
-/// Noise in several octaves, each finer and weaker than the one before. Its values lie between −1 and 1, mostly between
-/// −0.5 and 0.5.
-#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
-#[reflect(Default)]
-pub struct Fractal {
-    /// Another seed, another world.
-    pub seed: u32,
-    /// How many octaves are added up. Limit: 1..=16. Default: 5.
-    pub octaves: u32,
-    /// The size of the largest features. Units: world. Limit: > 0. Default: 120.
-    pub zoom: f64,
-    /// How strong each octave is, as a share of the one before. Limit: > 0, <= 1. Default: 0.45.
-    pub persistence: f64,
-    /// How many times finer each octave is than the one before. Limit: 1..=8. Default: 2.
-    pub lacunarity: f64,
-    /// Folds the noise, so that it has sharp ridges of 1 where it otherwise passes through 0. Default: false.
-    pub ridged: bool,
-}
-
-impl Default for Fractal {
-    fn default() -> Self {
-        Self { seed: 0, octaves: 5, zoom: 120.0, persistence: 0.45, lacunarity: 2.0, ridged: false }
-    }
-}
-
-impl Fractal {
-    /// Says what is wrong with the settings, if anything is.
-    ///
-    /// # Errors
-    /// [`SourceError::Setting`] for the first number that is out of its range.
-    pub fn validate(&self) -> Result<(), SourceError> {
-        check("the number of octaves", "from 1 to 16", f64::from(self.octaves), |v| (1.0..=16.0).contains(&v))?;
-        check_length("zoom", self.zoom)?;
-        check("persistence", "more than 0 and at most 1", self.persistence, |v| v > 0.0 && v <= 1.0)?;
-        check("lacunarity", "from 1 to 8", self.lacunarity, |v| (1.0..=8.0).contains(&v))?;
-        Ok(())
-    }
-}
+use super::{Fractal, ROOM, SourceError, check, check_position, rows, world_box};
 
 /// One octave of a [`Fractal`].
 #[derive(Clone, Debug)]
@@ -139,7 +100,7 @@ impl NoiseHeightsSettings {
     }
 }
 
-fn default_strata() -> Vec<Stratum> {
+pub(crate) fn default_strata() -> Vec<Stratum> {
     vec![
         Stratum { material: 2, below_depth: 5.0, ..Stratum::default() },
         Stratum { material: 2, steeper_than: 1.0, ..Stratum::default() },

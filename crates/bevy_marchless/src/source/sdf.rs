@@ -301,7 +301,7 @@ impl Sdf {
         }
     }
 
-    fn check(&self) -> Result<(), SourceError> {
+    pub(super) fn check(&self) -> Result<(), SourceError> {
         let position =
             |name, position: DVec3| position.to_array().into_iter().try_for_each(|v| check_position(name, v).map(drop));
         match self {

@@ -1,0 +1,255 @@
+//! [`Layer`]: a number for each column, composed of noise.
+
+use core::ops::{Add, Mul};
+
+use bevy_math::DVec2;
+use bevy_reflect::Reflect;
+use bevy_reflect::std_traits::ReflectDefault;
+
+use super::MOST_NESTED;
+use crate::source::{FARTHEST, Fractal, SourceError, check, check_length, check_position};
+
+/// A number for each column of the world: heights, or what heights are made of.
+///
+/// Layers are plain data, and are composed: `+` and `*` join them, [`min`](Self::min) and [`max`](Self::max) choose,
+/// the others bend what they are called on. Variants with a field `of` bend the sum of the layers in it.
+///
+/// ```
+/// use bevy_marchless::source::{Fractal, Layer};
+///
+/// let hills = Layer::noise(Fractal { zoom: 300.0, ..Fractal::default() }, 40.0);
+/// let mountains = Layer::ridges(Fractal { seed: 9, zoom: 500.0, ..Fractal::default() }, 120.0);
+/// let where_mountains_are = Layer::noise(Fractal { seed: 5, zoom: 2000.0, octaves: 2, ..Fractal::default() }, 2.0);
+/// let heights = 60.0 + hills + mountains * where_mountains_are.clamped(0.0, 1.0);
+/// # heights.validate()?;
+/// # Ok::<(), bevy_marchless::source::SourceError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Reflect)]
+#[reflect(Default, no_field_bounds)]
+#[non_exhaustive]
+pub enum Layer {
+    /// The same everywhere.
+    Constant(f64),
+    /// Fractal noise.
+    Noise {
+        /// The noise.
+        noise: Fractal,
+        /// How far it reaches above and below 0 at most. Limit: from −1e9 to 1e9.
+        amplitude: f64,
+    },
+    /// All layers added up; 0 for none.
+    Sum(Vec<Layer>),
+    /// All layers multiplied; 1 for none.
+    Product(Vec<Layer>),
+    /// The lowest of the layers. Limit: one or more.
+    Minimum(Vec<Layer>),
+    /// The highest of the layers. Limit: one or more.
+    Maximum(Vec<Layer>),
+    /// What lies beyond two ends is brought to them.
+    Clamp {
+        /// The layers whose sum is changed.
+        of: Vec<Layer>,
+        /// The lower end. Limit: at most `max`.
+        min: f64,
+        /// The upper end.
+        max: f64,
+    },
+    /// Steps: flat at each multiple of `step`, and steep between.
+    Terraces {
+        /// The layers whose sum is changed.
+        of: Vec<Layer>,
+        /// From one terrace to the next. Limit: > 0.
+        step: f64,
+        /// From 0, no terraces at all, to (not quite) 1, which are cliffs. Limit: 0..=0.99.
+        sharpness: f64,
+    },
+    /// Another place: the layers are taken from up to `reach` away along x and along z, as two noises say.
+    Warp {
+        /// The layers whose sum is changed.
+        of: Vec<Layer>,
+        /// Where from. The one for z has another seed.
+        noise: Fractal,
+        /// How far away at most, along each axis. Units: world. Limit: 0..=1e9.
+        reach: f64,
+    },
+    /// A curve through points (what comes in, what goes out), straight between them and level beyond its ends.
+    Curve {
+        /// The layers whose sum is changed.
+        of: Vec<Layer>,
+        /// The points. Limit: one or more, each farther in x than the one before.
+        points: Vec<DVec2>,
+    },
+}
+
+impl Default for Layer {
+    /// 0 everywhere.
+    fn default() -> Self {
+        Self::Constant(0.0)
+    }
+}
+
+impl From<f64> for Layer {
+    fn from(value: f64) -> Self {
+        Self::Constant(value)
+    }
+}
+
+impl Layer {
+    /// Fractal noise that reaches `amplitude` above and below 0 at most.
+    pub fn noise(noise: Fractal, amplitude: f64) -> Self {
+        Self::Noise { noise, amplitude }
+    }
+
+    /// Sharp ridges: folded fractal noise ([`Fractal::ridged`]) that reaches `amplitude` above and below 0 at most.
+    pub fn ridges(noise: Fractal, amplitude: f64) -> Self {
+        Self::Noise { noise: Fractal { ridged: true, ..noise }, amplitude }
+    }
+
+    /// Whichever layer is lower.
+    #[must_use]
+    pub fn min(self, other: impl Into<Self>) -> Self {
+        match self {
+            Self::Minimum(layers) => Self::Minimum(with(layers, other)),
+            first => Self::Minimum(vec![first, other.into()]),
+        }
+    }
+
+    /// Whichever layer is higher.
+    #[must_use]
+    pub fn max(self, other: impl Into<Self>) -> Self {
+        match self {
+            Self::Maximum(layers) => Self::Maximum(with(layers, other)),
+            first => Self::Maximum(vec![first, other.into()]),
+        }
+    }
+
+    /// Brought to `min` where it is lower and to `max` where it is higher.
+    #[must_use]
+    pub fn clamped(self, min: f64, max: f64) -> Self {
+        Self::Clamp { of: self.into_terms(), min, max }
+    }
+
+    /// In terraces: flat at each multiple of `step`; `sharpness` from 0 (as it was) to 0.99 (cliffs).
+    #[must_use]
+    pub fn terraced(self, step: f64, sharpness: f64) -> Self {
+        Self::Terraces { of: self.into_terms(), step, sharpness }
+    }
+
+    /// Taken from up to `reach` away along x and z, as `noise` says: bent out of shape. Units of `reach`: world.
+    #[must_use]
+    pub fn warped(self, noise: Fractal, reach: f64) -> Self {
+        Self::Warp { of: self.into_terms(), noise, reach }
+    }
+
+    /// Sent through a curve, given by points (what comes in, what goes out) of ascending x.
+    #[must_use]
+    pub fn curved(self, points: impl IntoIterator<Item = impl Into<DVec2>>) -> Self {
+        Self::Curve { of: self.into_terms(), points: points.into_iter().map(Into::into).collect() }
+    }
+
+    /// Says what is wrong with the layer, if anything is.
+    ///
+    /// # Errors
+    /// [`SourceError`] for the first number that is out of its range, a list that is empty where it must not be, and
+    /// layers nested more than 32 deep.
+    pub fn validate(&self) -> Result<(), SourceError> {
+        self.check(MOST_NESTED)
+    }
+
+    /// The layers of which this one is the sum.
+    fn into_terms(self) -> Vec<Self> {
+        match self {
+            Self::Sum(layers) => layers,
+            other => vec![other],
+        }
+    }
+
+    /// [`validate`](Self::validate) for layers nested at most `depth` deep.
+    pub(super) fn check(&self, depth: u32) -> Result<(), SourceError> {
+        let depth = depth.checked_sub(1).ok_or(SourceError::Nested { most: MOST_NESTED })?;
+        let not_empty = |what, found: usize| check(what, "at least 1", found as f64, |v| v >= 1.0).map(|_| ());
+        let parts = match self {
+            Self::Constant(value) => {
+                check_position("a constant layer", *value)?;
+                return Ok(());
+            }
+            Self::Noise { noise, amplitude } => {
+                check_position("the amplitude of noise", *amplitude)?;
+                return noise.validate();
+            }
+            Self::Sum(layers) | Self::Product(layers) => layers,
+            Self::Minimum(layers) | Self::Maximum(layers) => {
+                not_empty("the number of layers in a minimum or maximum", layers.len())?;
+                layers
+            }
+            Self::Clamp { of, min, max } => {
+                check_position("the lower end of a clamp", *min)?;
+                check_position("the upper end of a clamp", *max)?;
+                check("the lower end of a clamp", "at most its upper end", *min, |min| min <= *max)?;
+                of
+            }
+            Self::Terraces { of, step, sharpness } => {
+                check_length("the step of terraces", *step)?;
+                check("the sharpness of terraces", "from 0 to 0.99", *sharpness, |v| (0.0..=0.99).contains(&v))?;
+                of
+            }
+            Self::Warp { of, noise, reach } => {
+                check("the reach of a warp", "from 0 to 1e9", *reach, |v| (0.0..=FARTHEST).contains(&v))?;
+                noise.validate()?;
+                of
+            }
+            Self::Curve { of, points } => {
+                not_empty("the number of points of a curve", points.len())?;
+                for point in points {
+                    check_position("what goes into a curve", point.x)?;
+                    check_position("what comes out of a curve", point.y)?;
+                }
+                for pair in points.windows(2) {
+                    check("what goes into a curve", "more than at the point before", pair[1].x, |v| v > pair[0].x)?;
+                }
+                of
+            }
+        };
+        parts.iter().try_for_each(|part| part.check(depth))
+    }
+}
+
+fn with(mut layers: Vec<Layer>, other: impl Into<Layer>) -> Vec<Layer> {
+    layers.push(other.into());
+    layers
+}
+
+impl<L: Into<Layer>> Add<L> for Layer {
+    type Output = Self;
+
+    fn add(self, other: L) -> Self {
+        Self::Sum(with(self.into_terms(), other))
+    }
+}
+
+impl<L: Into<Layer>> Mul<L> for Layer {
+    type Output = Self;
+
+    fn mul(self, other: L) -> Self {
+        match self {
+            Self::Product(layers) => Self::Product(with(layers, other)),
+            first => Self::Product(vec![first, other.into()]),
+        }
+    }
+}
+
+impl Add<Layer> for f64 {
+    type Output = Layer;
+
+    fn add(self, layer: Layer) -> Layer {
+        Layer::Constant(self) + layer
+    }
+}
+
+impl Mul<Layer> for f64 {
+    type Output = Layer;
+
+    fn mul(self, layer: Layer) -> Layer {
+        Layer::Constant(self) * layer
+    }
+}
