@@ -7,7 +7,7 @@ mod snapshot;
 
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
-use bevy_math::{IVec3, Vec3};
+use bevy_math::{DVec3, IVec3};
 use marchless::Region;
 use marchless::bits::{BitGrid, BitsError};
 use thiserror::Error;
@@ -101,10 +101,16 @@ impl TerrainBits<'_, '_> {
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`].
-    pub fn overlaps_ball(&self, terrain: Entity, center: Vec3, radius: f32) -> Result<bool, TerrainBitsError> {
+    pub fn overlaps_ball(
+        &self,
+        terrain: Entity,
+        center: impl Into<DVec3>,
+        radius: f32,
+    ) -> Result<bool, TerrainBitsError> {
+        let (center, reach) = (center.into(), f64::from(radius));
         let is_ball = center.is_finite() && radius.is_finite() && radius >= 0.0;
         // Conversions saturate.
-        let [low, high] = [(center - radius).floor(), (center + radius).ceil()].map(|end| end.as_ivec3().to_array());
+        let [low, high] = [(center - reach).floor(), (center + reach).ceil()].map(|end| end.as_ivec3().to_array());
         let region =
             if is_ball { Region::new(low, high.map(|v| v.saturating_add(1))) } else { Region::new([0; 3], [0; 3]) };
         self.any_part(terrain, region, |part| part.overlaps_ball(center, radius))

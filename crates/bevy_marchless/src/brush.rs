@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_ecs::prelude::*;
-use bevy_math::{IVec3, Vec3};
+use bevy_math::{DVec3, IVec3, Vec3};
 use bevy_reflect::prelude::*;
 use marchless::BrushError;
 
@@ -89,30 +89,32 @@ impl Stamp {
 }
 
 /// A shape in the terrain's lattice: all numbers in voxels, from the terrain's lowest corner
-/// ([`TerrainQuery::to_lattice`](crate::query::TerrainQuery::to_lattice) gives them). Radii and half sizes lie above 0 and reach to 1,024.
+/// ([`TerrainQuery::to_lattice`](crate::query::TerrainQuery::to_lattice) gives them). Positions are in double precision, so that a
+/// brush is as exact ten million voxels away as it is at the origin, and reach to 2³⁰ (a thousand million voxels) either way. Radii and
+/// half sizes lie above 0 and reach to 1,024.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 pub enum BrushShape {
     /// A ball.
     Sphere {
         /// Its middle.
-        center: Vec3,
+        center: DVec3,
         /// Its radius.
         radius: f32,
     },
     /// A box along the lattice's axes.
     Box {
         /// Its middle.
-        center: Vec3,
+        center: DVec3,
         /// From the middle to the faces.
         half_size: Vec3,
     },
     /// What a ball sweeps on its way from one point to another, at most 2,048 voxels apart on each axis.
     Capsule {
         /// From here.
-        a: Vec3,
+        a: DVec3,
         /// To here; may be the same point.
-        b: Vec3,
+        b: DVec3,
         /// The ball's radius.
         radius: f32,
     },
@@ -120,26 +122,27 @@ pub enum BrushShape {
 
 impl BrushShape {
     /// A ball; in voxels.
-    pub const fn sphere(center: Vec3, radius: f32) -> Self {
-        Self::Sphere { center, radius }
+    pub fn sphere(center: impl Into<DVec3>, radius: f32) -> Self {
+        Self::Sphere { center: center.into(), radius }
     }
 
     /// A box along the axes, from `center - half_size` to `center + half_size`; in voxels.
-    pub const fn cuboid(center: Vec3, half_size: Vec3) -> Self {
-        Self::Box { center, half_size }
+    pub fn cuboid(center: impl Into<DVec3>, half_size: Vec3) -> Self {
+        Self::Box { center: center.into(), half_size }
     }
 
     /// What a ball sweeps on its way from `a` to `b`; in voxels.
-    pub const fn capsule(a: Vec3, b: Vec3, radius: f32) -> Self {
-        Self::Capsule { a, b, radius }
+    pub fn capsule(a: impl Into<DVec3>, b: impl Into<DVec3>, radius: f32) -> Self {
+        Self::Capsule { a: a.into(), b: b.into(), radius }
     }
 
     fn quantised(&self) -> Result<marchless::BrushShape, BrushError> {
-        let vector = |v: Vec3| v.as_dvec3().to_array();
         match *self {
-            Self::Sphere { center, radius } => marchless::BrushShape::sphere(vector(center), radius.into()),
-            Self::Box { center, half_size } => marchless::BrushShape::cuboid(vector(center), vector(half_size)),
-            Self::Capsule { a, b, radius } => marchless::BrushShape::capsule(vector(a), vector(b), radius.into()),
+            Self::Sphere { center, radius } => marchless::BrushShape::sphere(center.to_array(), radius.into()),
+            Self::Box { center, half_size } => {
+                marchless::BrushShape::cuboid(center.to_array(), half_size.as_dvec3().to_array())
+            }
+            Self::Capsule { a, b, radius } => marchless::BrushShape::capsule(a.to_array(), b.to_array(), radius.into()),
         }
     }
 }

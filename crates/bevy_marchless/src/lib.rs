@@ -54,6 +54,7 @@ pub mod debug;
 #[cfg(feature = "pbr")]
 pub mod material;
 pub mod mesh;
+mod place;
 pub mod query;
 pub mod schedule;
 pub mod source;

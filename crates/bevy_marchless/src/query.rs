@@ -4,9 +4,9 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_math::{DVec3, IVec3, Ray3d, Vec3};
 use bevy_reflect::prelude::*;
-use bevy_transform::components::GlobalTransform;
 use marchless::Region;
 
+use crate::place::{Place, PlaceItem};
 use crate::terrain::TerrainVolume;
 
 /// Questions to all terrains, in world space.
@@ -27,7 +27,7 @@ use crate::terrain::TerrainVolume;
 /// ```
 #[derive(SystemParam)]
 pub struct TerrainQuery<'w, 's> {
-    terrains: Query<'w, 's, (Entity, &'static TerrainVolume, &'static GlobalTransform)>,
+    terrains: Query<'w, 's, (Entity, &'static TerrainVolume, Place)>,
 }
 
 /// Where a ray hits a terrain.
@@ -43,7 +43,7 @@ pub struct TerrainHit {
     /// The triangle's unit normal in world space, to the outside.
     pub normal: Vec3,
     /// Where, in voxels from the terrain's lowest corner, as stamps want it.
-    pub lattice: Vec3,
+    pub lattice: DVec3,
     /// What the nearest corner of the triangle is made of.
     pub material: u8,
     /// How far from the ray's origin, in world units.
@@ -76,33 +76,34 @@ impl TerrainQuery<'_, '_> {
         if Region::new(low, high.map(|v| v + 1)).points().any(unfilled) {
             return None;
         }
-        marchless::weight_at(&volume.grid, lattice.as_dvec3().to_array())
+        marchless::weight_at(&volume.grid, lattice.to_array())
     }
 
     /// A position in world space in voxels from the terrain's lowest corner, as stamps want it.
-    pub fn to_lattice(&self, terrain: Entity, position: Vec3) -> Option<Vec3> {
-        let (_, volume, transform) = self.terrains.get(terrain).ok()?;
-        let lattice = transform.affine().inverse().transform_point3(position) / volume.settings()?.voxel_size;
+    pub fn to_lattice(&self, terrain: Entity, position: Vec3) -> Option<DVec3> {
+        let (_, volume, place) = self.terrains.get(terrain).ok()?;
+        let local = place.to_terrain().transform_point3(position.as_dvec3());
+        let lattice = local / f64::from(volume.settings()?.voxel_size);
         lattice.is_finite().then_some(lattice)
     }
 
     /// A position in voxels from the terrain's lowest corner, in world space.
-    pub fn to_world(&self, terrain: Entity, lattice: Vec3) -> Option<Vec3> {
-        let (_, volume, transform) = self.terrains.get(terrain).ok()?;
-        Some(transform.transform_point(lattice * volume.settings()?.voxel_size))
+    pub fn to_world(&self, terrain: Entity, lattice: impl Into<DVec3>) -> Option<Vec3> {
+        let (_, volume, place) = self.terrains.get(terrain).ok()?;
+        let local = lattice.into() * f64::from(volume.settings()?.voxel_size);
+        Some(place.to_world().transform_point3(local).as_vec3())
     }
 }
 
 fn cast(
-    (terrain, volume, transform): (Entity, &TerrainVolume, &GlobalTransform),
+    (terrain, volume, place): (Entity, &TerrainVolume, PlaceItem),
     ray: Ray3d,
     max_distance: f32,
 ) -> Option<TerrainHit> {
-    let voxel_size = volume.settings()?.voxel_size;
-    let to_world = transform.affine();
-    let to_local = to_world.inverse();
-    let origin = (to_local.transform_point3(ray.origin) / voxel_size).as_dvec3();
-    let step = (to_local.transform_vector3(*ray.direction) / voxel_size).as_dvec3();
+    let voxel_size = f64::from(volume.settings()?.voxel_size);
+    let (to_world, to_terrain) = (place.to_world(), place.to_terrain());
+    let origin = to_terrain.transform_point3(ray.origin.as_dvec3()) / voxel_size;
+    let step = to_terrain.transform_vector3(ray.direction.as_dvec3()) / voxel_size;
     // Voxels per world unit along the ray.
     let scale = step.length();
     let direction = step / scale;
@@ -118,13 +119,13 @@ fn cast(
             start += hit.distance + 1e-3;
             continue;
         };
-        let lattice = DVec3::from(hit.position).as_vec3();
-        let normal = to_world.matrix3.inverse().transpose() * Vec3::from(hit.normal);
+        let lattice = DVec3::from(hit.position);
+        let normal = to_terrain.matrix3.transpose() * Vec3::from(hit.normal).as_dvec3();
         return Some(TerrainHit {
             terrain,
             chunk,
-            position: to_world.transform_point3(lattice * voxel_size),
-            normal: normal.normalize_or_zero(),
+            position: to_world.transform_point3(lattice * voxel_size).as_vec3(),
+            normal: normal.as_vec3().normalize_or_zero(),
             lattice,
             material: hit.material,
             distance: ((start + hit.distance) / scale) as f32,

@@ -114,7 +114,7 @@ fn assert_answers(app: &mut App, terrain: Entity) {
         let distance =
             |point: [i32; 3]| Vec3::from(point.map(|v| v as f32)).as_dvec3().distance(Vec3::from(center).as_dvec3());
         let expected = oracle.0.iter().any(|point| distance(*point) <= f64::from(radius));
-        let found = ask(app, move |bits| bits.overlaps_ball(terrain, center.into(), radius));
+        let found = ask(app, move |bits| bits.overlaps_ball(terrain, Vec3::from(center), radius));
         assert_eq!(found, Ok(expected), "{center:?}, {radius}");
     }
     // A diagonal bar, longer than a chunk.

@@ -5,7 +5,7 @@ mod common;
 use bevy_app::App;
 use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
-use bevy_math::{Dir3, Quat, Ray3d, Vec3};
+use bevy_math::{DVec3, Dir3, Quat, Ray3d, Vec3};
 use bevy_transform::components::Transform;
 use common::*;
 
@@ -33,7 +33,7 @@ fn a_ray_hits_a_moved_turned_and_scaled_terrain() {
         assert!((hit.distance - 38.0).abs() < 0.1, "{hit:?}");
         assert!((hit.position - (middle + direction * 12.0)).length() < 0.1, "{hit:?}");
         assert!(hit.normal.dot(direction) > 0.95, "{hit:?}");
-        assert!((hit.lattice.distance(Vec3::splat(16.0)) - 12.0).abs() < 0.1, "{hit:?}");
+        assert!((hit.lattice.distance(DVec3::splat(16.0)) - 12.0).abs() < 0.1, "{hit:?}");
         let chunk = app.world().get::<Chunk>(hit.chunk).expect("a chunk's entity");
         assert_eq!(chunk.position, (hit.lattice / 16.0).floor().as_ivec3());
         assert!(cast(&mut app, origin, middle, 37.0).is_none(), "too far away");

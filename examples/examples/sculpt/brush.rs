@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use bevy::input::mouse::AccumulatedMouseScroll;
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
+use bevy::math::DVec3;
 use bevy::pbr::wireframe::NoWireframe;
 use bevy::prelude::*;
 use bevy::window::{CursorOptions, PrimaryWindow};
@@ -26,7 +27,7 @@ pub(crate) struct Brush {
     /// How far away it is where there is no surface. [Units: world]
     pub(crate) distance: f32,
     /// Where it is, in the terrain's voxels.
-    pub(crate) place: Option<Vec3>,
+    pub(crate) place: Option<DVec3>,
     /// The stroke that goes on while a button is held.
     stroke: Option<Held>,
     /// How many strokes there were.

@@ -1,6 +1,6 @@
 //! [`Part`]: what a question reads of one chunk.
 
-use bevy_math::Vec3;
+use bevy_math::DVec3;
 use marchless::Region;
 use marchless::bits::BitGrid;
 
@@ -64,12 +64,12 @@ impl Part {
     }
 
     /// Whether a solid point of it is at most `radius` from `center`.
-    pub(super) fn overlaps_ball(&self, center: Vec3, radius: f32) -> Result<bool, TerrainBitsError> {
+    pub(super) fn overlaps_ball(&self, center: DVec3, radius: f32) -> Result<bool, TerrainBitsError> {
         Ok(match self.bits.get()? {
             Derived::Uniform(solid) => *solid && ball_reaches(center, radius, self.region),
             Derived::Mixed(grid) => {
-                let origin = Vec3::from(self.origin.map(|v| v as f32));
-                grid.overlaps_ball((center - origin).to_array(), radius)
+                let origin = DVec3::from(self.origin.map(f64::from));
+                grid.overlaps_ball((center - origin).as_vec3().to_array(), radius)
             }
         })
     }
@@ -103,9 +103,9 @@ fn difference(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
 }
 
 /// Whether some point of a region that is not empty is at most `radius` from `center`.
-fn ball_reaches(center: Vec3, radius: f32, region: Region) -> bool {
+fn ball_reaches(center: DVec3, radius: f32, region: Region) -> bool {
     let distances = [0, 1, 2].map(|axis| {
-        let center = f64::from(center[axis]);
+        let center = center[axis];
         center.round().clamp(f64::from(region.min[axis]), f64::from(region.max[axis] - 1)) - center
     });
     distances.iter().map(|distance| distance * distance).sum::<f64>() <= f64::from(radius) * f64::from(radius)

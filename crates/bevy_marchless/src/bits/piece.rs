@@ -110,7 +110,7 @@ impl Piece {
         // How far beyond its outermost points a box ends: at these, samples become half a voxel of air, and at those
         // next to them at least half a voxel of ground stays.
         let rim = if isovalue.is_finite() { (0.5 + isovalue).clamp(0.1, 3.5) } else { 0.5 };
-        let origin = IVec3::from(self.bounds.min).as_vec3();
+        let origin = IVec3::from(self.bounds.min).as_dvec3();
         let mut stamps = Vec::new();
         let mut regions = vec![Region::new([0; 3], self.bounds.size().map(|v| v as i32))];
         while let Some(region) = regions.pop() {
@@ -119,7 +119,7 @@ impl Piece {
             let axis = (0..3).max_by_key(|axis| size[*axis]).unwrap_or(0);
             if size[axis] <= LONGEST_BOX && !others.overlaps_region(region) {
                 let [low, high] = [region.min, region.max.map(|v| v - 1)].map(|end| IVec3::from(end).as_vec3());
-                let shape = BrushShape::cuboid(origin + 0.5 * (low + high), 0.5 * (high - low) + rim);
+                let shape = BrushShape::cuboid(origin + 0.5 * (low + high).as_dvec3(), 0.5 * (high - low) + rim);
                 stamps.push(Stamp::dig(terrain, shape));
                 continue;
             }
