@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bevy::app::PluginGroupBuilder;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
 use bevy_marchless::prelude::TerrainVolume;
@@ -25,13 +26,21 @@ struct Arguments {
 /// With `--screenshot FILE.png` it has no window, renders one picture as soon as all terrains are drawn, and exits. Where there
 /// is no screen or no graphics adapter it says so and exits with code 1.
 pub fn app(title: &str) -> App {
-    let Arguments { screenshot } = Arguments::parse();
+    app_with(title, Arguments::parse().screenshot, |plugins| plugins)
+}
+
+/// The same for examples with flags of their own. `plugins`: changes Bevy's default plugins.
+pub fn app_with(
+    title: &str,
+    screenshot: Option<PathBuf>,
+    plugins: impl Fn(PluginGroupBuilder) -> PluginGroupBuilder,
+) -> App {
     let built = graphics::build(|app| match screenshot {
         None => {
-            app.add_plugins((window_plugins(title), FlyCameraPlugin));
+            app.add_plugins((plugins(window_plugins(title)), FlyCameraPlugin));
         }
         Some(path) => {
-            app.add_plugins((picture_plugins(), PicturePlugin { path, size: UVec2::new(640, 360) }))
+            app.add_plugins((plugins(picture_plugins()), PicturePlugin { path, size: UVec2::new(640, 360) }))
                 .add_systems(PreUpdate, wait_for_terrains);
         }
     });
@@ -53,7 +62,11 @@ pub fn sun(direction: Vec3) -> impl Bundle {
     )
 }
 
-fn picture_name(text: &str) -> Result<PathBuf, String> {
+/// The name of a picture file, as the command line gives it.
+///
+/// # Errors
+/// A sentence, where it does not end in .png.
+pub fn picture_name(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     check_picture_name(&path)?;
     Ok(path)

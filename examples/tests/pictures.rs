@@ -62,6 +62,20 @@ fn quickstart_shows_hills() {
 }
 
 #[test]
+fn ten_million_voxels_away_everything_looks_the_same() {
+    let picture = |name: &str, voxels: &str| {
+        let path = picture_path(name);
+        render(example("far_away").args(["--voxels", voxels]).arg("--screenshot").arg(&path))?;
+        Some(Picture::read(&path))
+    };
+    let Some(near) = picture("far_away_0", "0") else { return };
+    let Some(far) = picture("far_away_10000000", "10000000") else { return };
+    near.assert_is_a_landscape();
+    let differing = near.pixels.iter().zip(&far.pixels).filter(|(a, b)| a != b).count();
+    assert_eq!((near.pixels.len(), differing), (far.pixels.len(), 0), "pixels that differ");
+}
+
+#[test]
 fn what_hangs_free_falls_and_comes_to_rest() {
     let picture = |moment: &str| {
         let path = picture_path(&format!("falling_pieces_{moment}"));

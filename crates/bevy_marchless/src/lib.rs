@@ -45,8 +45,11 @@
 //!
 //! # Features
 //! `pbr` (materials), `gizmos` (bounds of chunks), `noise` and `png` (sources); all are on by default. Without them, and
-//! without any renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
+//! without any renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)). `big_space`, off by default,
+//! puts chunks into the cells of a `big_space` grid, for worlds of any size.
 
+#[cfg(feature = "big_space")]
+pub mod big_space;
 pub mod bits;
 pub mod brush;
 pub mod chunk;
@@ -98,6 +101,8 @@ plugin_group! {
         mesh:::MeshingPlugin,
         #[cfg(feature = "pbr")]
         material:::MaterialPlugin,
+        #[cfg(feature = "big_space")]
+        big_space:::BigSpacePlugin,
         debug:::DebugPlugin,
     }
 }

@@ -8,11 +8,17 @@ use bevy_transform::components::GlobalTransform;
 #[derive(QueryData)]
 pub(crate) struct Place {
     transform: &'static GlobalTransform,
+    #[cfg(feature = "big_space")]
+    grid: Option<&'static ::big_space::grid::Grid>,
 }
 
 impl PlaceItem<'_, '_> {
     /// From the terrain's own space (world units from its lattice's origin, so voxels times the voxel size) to world space.
     pub(crate) fn to_world(&self) -> DAffine3 {
+        #[cfg(feature = "big_space")]
+        if let Some(grid) = self.grid {
+            return crate::big_space::grid_to_world(grid);
+        }
         let affine = self.transform.affine();
         DAffine3 { matrix3: affine.matrix3.as_dmat3(), translation: affine.translation.as_dvec3() }
     }
