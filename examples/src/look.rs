@@ -177,11 +177,13 @@ pub struct Scene {
     pub relief: [f32; 2],
     /// How large the scene is: shadows reach and fog begins as far. [Units: world]
     pub size: f32,
+    /// Where the world ends, if it does while one looks: fog hides everything from there on. [Units: world from the camera]
+    pub end: Option<f32>,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { look: 0, relief: [0.0, 100.0], size: 256.0 }
+        Self { look: 0, relief: [0.0, 100.0], size: 256.0, end: None }
     }
 }
 
@@ -250,13 +252,16 @@ fn wear_look(
     };
     commands.entity(sun).insert(cascades.build());
 
-    let far = scene.size / 256.0;
+    let falloff = match scene.end {
+        Some(end) => FogFalloff::Linear { start: 0.3 * end, end },
+        None => FogFalloff::from_visibility_squared(look.visibility * scene.size / 256.0),
+    };
     for camera in &cameras {
         let fog = DistanceFog {
             color: horizon.into(),
             directional_light_color: Color::from(linear(look.sun)).with_alpha(0.06),
             directional_light_exponent: 12.0,
-            falloff: FogFalloff::from_visibility_squared(look.visibility * far),
+            falloff: falloff.clone(),
         };
         commands.entity(camera).insert((fog, Tonemapping::AcesFitted));
     }
@@ -264,7 +269,7 @@ fn wear_look(
 
 /// A colour of the sky, as bright as the tone mapping wants it.
 pub(crate) fn air(color: [f32; 3]) -> LinearRgba {
-    linear(color) * 1.5
+    (linear(color) * 1.5).with_alpha(1.0)
 }
 
 /// A colour given in sRGB.

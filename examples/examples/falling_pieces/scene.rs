@@ -51,7 +51,7 @@ fn solids() -> Sdf {
 }
 
 fn set_up(mut commands: Commands, mut scene: ResMut<Scene>, ground: Res<Ground>) {
-    *scene = Scene { look: LOOK, relief: [-12.0, 110.0], size: 150.0 };
+    *scene = Scene { look: LOOK, relief: [-12.0, 110.0], size: 150.0, ..default() };
     commands.spawn((terrain(), MeshMaterial3d(ground.0.clone())));
     commands.spawn(fly_camera(Vec3::new(16.0, 62.0, 158.0), Vec3::new(62.0, 34.0, 58.0)));
 }

@@ -248,5 +248,5 @@ fn follow_world(
     *made_of = Some(world.clone());
     transform.scale = Vec3::splat(1.0 / terrain.voxel_size);
     let size = terrain.size_in_voxels().as_vec3();
-    *scene = Scene { look: world.look, relief: world.relief(), size: size.x.max(size.z) };
+    *scene = Scene { look: world.look, relief: world.relief(), size: size.x.max(size.z), ..default() };
 }

@@ -1,0 +1,87 @@
+//! [`World`]: hills without end, and how far one sees.
+
+use core::ops::RangeInclusive;
+
+use bevy::prelude::*;
+use bevy_marchless::prelude::*;
+use marchless_examples::look::{Ground, LOOKS, ROCK, Scene};
+
+/// What the world is made of, and how far one sees.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub(crate) struct World {
+    /// Another number, other hills.
+    pub(crate) seed: u32,
+    /// [Units: voxels]
+    pub(crate) radius: f32,
+    /// The index of its look.
+    pub(crate) look: usize,
+}
+
+/// How far one may see. [Units: voxels]
+pub(crate) const RADII: RangeInclusive<f32> = 64.0..=1_024.0;
+/// How high and low the viewer's range reaches at most, so that its chunks are not too many. [Units: voxels]
+const HEIGHT: f32 = 448.0;
+/// Between these heights most of the ground lies. [Units: voxels]
+const RELIEF: [f32; 2] = [-46.0, 46.0];
+/// Higher than all hills. [Units: voxels]
+pub(crate) const FLIGHT_LEVEL: f32 = 64.0;
+/// How deep the ground's own colours reach; below is rock. [Units: voxels]
+const TOPSOIL: f64 = 2.0;
+/// The share of the range at which everything has faded, so that its end is not seen.
+const FADED: f32 = 0.95;
+
+impl World {
+    /// The hills.
+    ///
+    /// # Errors
+    /// [`SourceError`] about a number that is out of its range.
+    pub(crate) fn source(&self) -> Result<NoiseHeights, SourceError> {
+        NoiseHeights::new(NoiseHeightsSettings {
+            noise: Fractal { seed: self.seed, octaves: 6, zoom: 150.0, ..Fractal::default() },
+            base: 0.0,
+            amplitude: 64.0,
+            strata: vec![Stratum { material: ROCK, below_depth: TOPSOIL, ..Stratum::default() }],
+        })
+    }
+
+    /// The terrain made of it, without any border.
+    ///
+    /// # Errors
+    /// As [`Self::source`].
+    pub(crate) fn terrain(&self) -> Result<Terrain, SourceError> {
+        Ok(Terrain::endless(self.source()?).with_palette(LOOKS[self.look].palette()))
+    }
+
+    /// What makes an entity see it.
+    pub(crate) fn viewer(&self) -> TerrainViewer {
+        TerrainViewer::new(self.radius).with_height(self.radius.min(HEIGHT))
+    }
+}
+
+pub(crate) fn plugin(app: &mut App) {
+    app.add_systems(Startup, spawn_terrain).add_systems(Update, follow_world.run_if(resource_changed::<World>));
+}
+
+fn spawn_terrain(world: Res<World>, ground: Res<Ground>, mut commands: Commands) -> Result {
+    commands.spawn((world.terrain()?, MeshMaterial3d(ground.0.clone())));
+    Ok(())
+}
+
+/// Keeps viewers, cameras and the scene as the world wants them.
+fn follow_world(
+    world: Res<World>,
+    mut scene: ResMut<Scene>,
+    mut viewers: Query<(&mut TerrainViewer, Option<&mut Projection>)>,
+) {
+    let end = Some(FADED * world.radius);
+    *scene = Scene { look: world.look, relief: RELIEF, size: 0.4 * world.radius, end };
+    for (mut viewer, projection) in &mut viewers {
+        viewer.set_if_neq(world.viewer());
+        if let Some(Projection::Perspective(mut perspective)) = projection.as_deref().cloned() {
+            perspective.far = 1.5 * world.radius;
+            if let Some(mut projection) = projection {
+                *projection = Projection::Perspective(perspective);
+            }
+        }
+    }
+}
