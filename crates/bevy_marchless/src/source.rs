@@ -29,9 +29,15 @@ mod height_field;
 #[cfg(feature = "png")]
 mod height_map;
 #[cfg(feature = "noise")]
+mod interval;
+#[cfg(feature = "noise")]
 mod landscape;
 #[cfg(feature = "noise")]
 mod noise;
+#[cfg(feature = "noise")]
+mod octaves;
+#[cfg(feature = "noise")]
+mod perlin;
 mod sdf;
 #[cfg(any(feature = "noise", feature = "png"))]
 mod strata;

@@ -173,7 +173,8 @@ fn far_regions_are_skipped() {
     let hills = NoiseHeights::default();
     assert_eq!(hills.bound(&at(113)), Bound::Outside);
     assert_eq!(hills.bound(&at(60)), Bound::Mixed);
-    assert_eq!(hills.bound(&at(-40)), Bound::Inside { material: 2 });
+    assert_eq!(hills.bound(&at(-70)), Bound::Inside { material: 2 });
+    assert_eq!(hills.bound_closely(&at(-40)), Bound::Inside { material: 2 });
     let ground = Some(NoiseHeightsSettings::default());
     let caves = NoiseDensity::new(NoiseDensitySettings { ground, ..Default::default() }).expect("in range");
     assert_eq!(caves.bound(&at(113)), Bound::Outside);

@@ -1,8 +1,16 @@
 //! [`Landscape`]: a source composed of layers of noise, caves, shapes and rules for materials.
 
+mod body;
+mod columns;
+mod field;
 mod layer;
 mod material;
+mod parts;
 mod solid;
+
+use core::fmt;
+use core::sync::atomic::{AtomicU64, Ordering};
+use std::sync::Arc;
 
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
@@ -12,8 +20,14 @@ pub use layer::Layer;
 pub use material::{MaterialRule, Patches};
 pub use solid::{Caves, Solid, Tunnels};
 
-use super::SourceError;
+use self::body::{Body, Region, Window};
+use self::field::Places;
+use self::material::Rules;
+use self::parts::{Line, Part, Row};
+use super::height_field::Column;
+use super::interval::Interval;
 use super::noise::default_strata;
+use super::{ROOM, SourceError, rows, world_box};
 
 /// How deep layers and solids may be nested.
 const MOST_NESTED: u32 = 32;
@@ -47,11 +61,18 @@ impl LandscapeSettings {
     }
 }
 
-/// [`LandscapeSettings`], ready to be sampled.
-#[derive(Clone, Debug, Reflect)]
+/// [`LandscapeSettings`], ready to be sampled. Clones share the heights that were evaluated already.
+#[derive(Clone, Reflect)]
 #[reflect(opaque)]
 pub struct Landscape {
+    compiled: Arc<Compiled>,
+}
+
+struct Compiled {
     settings: LandscapeSettings,
+    body: Body,
+    rules: Rules,
+    noise_calls: AtomicU64,
 }
 
 impl Landscape {
@@ -61,21 +82,136 @@ impl Landscape {
     /// As [`LandscapeSettings::validate`].
     pub fn new(settings: LandscapeSettings) -> Result<Self, SourceError> {
         settings.validate()?;
-        Ok(Self { settings })
+        Ok(Self::of_valid(settings))
+    }
+
+    /// The landscape of settings that are known to be valid.
+    pub(super) fn of_valid(settings: LandscapeSettings) -> Self {
+        let body = Body::new(&settings.solid, &mut 0);
+        let rules = Rules::new(&settings.materials);
+        Self { compiled: Arc::new(Compiled { settings, body, rules, noise_calls: AtomicU64::new(0) }) }
     }
 
     /// What it is made of.
     pub fn settings(&self) -> &LandscapeSettings {
-        &self.settings
+        &self.compiled.settings
+    }
+
+    /// How often noise was evaluated so far, by this landscape and its clones: once for each octave and point.
+    pub fn noise_calls(&self) -> u64 {
+        self.compiled.noise_calls.load(Ordering::Relaxed)
+    }
+
+    /// The height of the first ground in the landscape at a position; none where it has no ground. Units: world.
+    pub fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let mut calls = 0;
+        let grounds = self.compiled.body.grounds();
+        let field = grounds.first()?.columns.field();
+        let mut height = [0.0];
+        field.values(&Places::Grid { xs: &[x], zs: &[z] }, &mut height, &mut calls);
+        self.count(calls);
+        Some(height[0])
+    }
+
+    fn count(&self, calls: u64) {
+        self.compiled.noise_calls.fetch_add(calls, Ordering::Relaxed);
+    }
+
+    /// A region in world units; `reach` is how far distances are told apart.
+    fn region<'a>(&self, region: &SourceRegion, columns: Option<Window<'a>>) -> Region<'a> {
+        let sides = world_box(region).map(|[low, high]| Interval { low, high });
+        let reach = self.compiled.rules.deepest.max(ROOM * region.spacing);
+        Region { sides, spacing: region.spacing, reach, columns }
+    }
+
+    /// The columns of each ground in a region.
+    fn columns(&self, region: &SourceRegion, calls: &mut u64) -> Vec<Vec<Column>> {
+        self.compiled.body.grounds().into_iter().map(|ground| ground.columns.of(region, calls)).collect()
+    }
+
+    /// What is certain in a region.
+    fn certain(&self, region: &Region, noisily: bool, calls: &mut u64) -> Bound {
+        let known = self.compiled.body.known(region, noisily, calls);
+        if known.roomy.low >= 0.0 && known.distance.low >= 0.0 {
+            return Bound::Outside;
+        }
+        let material = if known.roomy.high < 0.0 && known.distance.high < 0.0 {
+            let depth = [-known.distance.high, -known.distance.low];
+            known.matter.and_then(|matter| match u8::try_from(matter) {
+                Ok(material) => Some(material),
+                Err(_) => self.compiled.rules.material_within(depth, [region.sides[1].low, region.sides[1].high]),
+            })
+        } else {
+            None
+        };
+        material.map_or(Bound::Mixed, |material| Bound::Inside { material })
+    }
+}
+
+impl fmt::Debug for Landscape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Landscape").field("settings", self.settings()).finish_non_exhaustive()
+    }
+}
+
+impl Default for Landscape {
+    fn default() -> Self {
+        Self::of_valid(LandscapeSettings::default())
     }
 }
 
 impl Source for Landscape {
-    fn fill(&self, _region: &SourceRegion, distances: &mut [f32], _materials: &mut [u8]) {
-        distances.fill(f32::MAX);
+    fn fill(&self, samples: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+        if samples.is_empty() {
+            return;
+        }
+        let mut calls = 0;
+        let columns = self.columns(samples, &mut calls);
+        let width = samples.size[0] as usize;
+        let part = [0..width, 0..samples.size[2] as usize];
+        let region = self.region(samples, Some(Window { columns: &columns, width, part }));
+        let mut body = Part::new(&self.compiled.body, samples, &region, &columns);
+        let xs: Vec<f64> = (0..samples.size[0]).map(|x| samples.position([x, 0, 0])[0]).collect();
+        let mut row = Row::new(width);
+        let mut rules = self.compiled.rules.for_rows(&xs);
+        for (index, distances, materials) in rows(samples, distances, materials) {
+            let [_, y, z] = samples.position([0, index[0], index[1]]);
+            let line = Line { index, xs: &xs, y, z, room: region.room(), reach: region.reach };
+            body.evaluate(&line, 0..width, &mut row, &mut calls);
+            for (distance, sample) in distances.iter_mut().zip(&row.distance) {
+                *distance = ((sample / samples.spacing) as f32).clamp(f32::MIN, f32::MAX);
+            }
+            rules.give(&line, &row, materials, &mut calls);
+        }
+        self.count(calls);
     }
 
-    fn bound(&self, _region: &SourceRegion) -> Bound {
-        Bound::Mixed
+    fn bound(&self, region: &SourceRegion) -> Bound {
+        let region = self.region(region, None);
+        let mut calls = 0;
+        let bound = match self.certain(&region, false, &mut calls) {
+            Bound::Mixed => self.certain(&region, true, &mut calls),
+            bound => bound,
+        };
+        self.count(calls);
+        bound
+    }
+
+    fn bound_closely(&self, samples: &SourceRegion) -> Bound {
+        let bound = self.bound(samples);
+        let most = samples.size[0].max(samples.size[2]);
+        if bound != Bound::Mixed || samples.is_empty() || most > MOST_COLUMNS {
+            return bound;
+        }
+        let mut calls = 0;
+        let columns = self.columns(samples, &mut calls);
+        let part = [0..samples.size[0] as usize, 0..samples.size[2] as usize];
+        let window = Window { columns: &columns, width: samples.size[0] as usize, part };
+        let bound = self.certain(&self.region(samples, Some(window)), true, &mut calls);
+        self.count(calls);
+        bound
     }
 }
+
+/// Regions that are wider are not looked at column by column.
+const MOST_COLUMNS: u32 = 512;

@@ -1,69 +1,14 @@
-//! Landscapes and caves of fractal noise, over the `noise` crate's Perlin noise.
+//! Hills and caves of fractal noise: the two simplest landscapes.
 
-use ::noise::{NoiseFn, Perlin};
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
 use marchless::{Bound, Source, SourceRegion};
 
-use super::height_field::{self, Column, HeightField};
-use super::strata::{Stratum, material_at};
-use super::{Fractal, ROOM, SourceError, check, check_position, rows, world_box};
-
-/// One octave of a [`Fractal`].
-#[derive(Clone, Debug)]
-struct Octave {
-    perlin: Perlin,
-    amplitude: f64,
-    frequency: f64,
-    offset: f64,
-}
-
-/// A [`Fractal`] ready to be evaluated.
-#[derive(Clone, Debug)]
-struct Octaves {
-    octaves: Vec<Octave>,
-    ridged: bool,
-}
-
-impl Octaves {
-    /// Of settings that are valid.
-    fn new(settings: &Fractal) -> Self {
-        let amplitudes = |index: u32| settings.persistence.powi(index as i32);
-        let sum: f64 = (0..settings.octaves).map(amplitudes).sum();
-        let octave = |index: u32| Octave {
-            perlin: Perlin::new(settings.seed.wrapping_add(index)),
-            amplitude: amplitudes(index) / sum,
-            frequency: settings.lacunarity.powi(index as i32) / settings.zoom,
-            // Perlin noise is 0 at whole numbers; without offsets all octaves would meet there.
-            offset: (f64::from(index) + 1.0) * 0.618_033_988_749_895,
-        };
-        Self { octaves: (0..settings.octaves).map(octave).collect(), ridged: settings.ridged }
-    }
-
-    /// From −1 to 1.
-    fn get<const N: usize>(&self, position: [f64; N]) -> f64
-    where
-        Perlin: NoiseFn<f64, N>,
-    {
-        let mut sum = 0.0;
-        for Octave { perlin, amplitude, frequency, offset } in &self.octaves {
-            let value = perlin.get(position.map(|v| repeat(v * frequency + offset)));
-            sum += amplitude * if self.ridged { 1.0 - 2.0 * value.abs() } else { value };
-        }
-        sum
-    }
-
-    /// How much the noise typically changes per world unit.
-    fn typical_gradient(&self) -> f64 {
-        self.octaves.iter().map(|octave| (octave.amplitude * octave.frequency).powi(2)).sum::<f64>().sqrt()
-    }
-}
-
-/// The same point of Perlin noise, which repeats every 256, at a coordinate from 0 to 256: far away it would overflow.
-fn repeat(coordinate: f64) -> f64 {
-    let near = coordinate - 256.0 * (coordinate / 256.0).floor();
-    if near.is_finite() { near } else { 0.0 }
-}
+use super::strata::Stratum;
+use super::{
+    Caves, FARTHEST, Fractal, Landscape, LandscapeSettings, Layer, MaterialRule, Solid, SourceError, check,
+    check_position,
+};
 
 /// What [`NoiseHeights`] are made of.
 #[derive(Clone, Debug, PartialEq, Reflect)]
@@ -95,7 +40,7 @@ impl NoiseHeightsSettings {
     pub fn validate(&self) -> Result<(), SourceError> {
         self.noise.validate()?;
         check_position("the base height", self.base)?;
-        check("the amplitude", "from 0 to 1e9", self.amplitude, |v| (0.0..=super::FARTHEST).contains(&v))?;
+        check("the amplitude", "from 0 to 1e9", self.amplitude, |v| (0.0..=FARTHEST).contains(&v))?;
         Ok(())
     }
 }
@@ -110,12 +55,19 @@ pub(crate) fn default_strata() -> Vec<Stratum> {
 
 /// Hills: the height of the ground is fractal noise, evaluated once per column.
 ///
-/// Chunks above the highest and below the lowest possible ground are skipped without sampling.
+/// It is the [`Landscape`] whose ground is the base and the noise. Clones share the heights that were evaluated already.
 #[derive(Clone, Debug, Reflect)]
 #[reflect(opaque)]
 pub struct NoiseHeights {
     settings: NoiseHeightsSettings,
-    octaves: Octaves,
+    landscape: Landscape,
+}
+
+impl NoiseHeightsSettings {
+    /// The same as a part of a landscape.
+    fn solid(&self) -> Solid {
+        Solid::Ground(self.base + Layer::noise(self.noise, self.amplitude))
+    }
 }
 
 impl NoiseHeights {
@@ -129,7 +81,7 @@ impl NoiseHeights {
     }
 
     fn of_valid(settings: NoiseHeightsSettings) -> Self {
-        Self { octaves: Octaves::new(&settings.noise), settings }
+        Self { landscape: landscape(settings.solid(), &settings.strata), settings }
     }
 
     /// Hills of the default settings, but of another seed.
@@ -145,8 +97,18 @@ impl NoiseHeights {
 
     /// The height of the ground at a position. Units: world.
     pub fn height(&self, x: f64, z: f64) -> f64 {
-        self.settings.base + self.settings.amplitude * self.octaves.get([x, z])
+        self.landscape.height(x, z).unwrap_or(self.settings.base)
     }
+
+    /// How often noise was evaluated so far, as of [`Landscape::noise_calls`].
+    pub fn noise_calls(&self) -> u64 {
+        self.landscape.noise_calls()
+    }
+}
+
+fn landscape(solid: Solid, strata: &[Stratum]) -> Landscape {
+    let materials = strata.iter().copied().map(MaterialRule::from).collect();
+    Landscape::of_valid(LandscapeSettings { solid, materials })
 }
 
 impl Default for NoiseHeights {
@@ -155,24 +117,17 @@ impl Default for NoiseHeights {
     }
 }
 
-impl HeightField for NoiseHeights {
-    fn height(&self, x: f64, z: f64) -> f64 {
-        self.height(x, z)
-    }
-
-    fn range(&self, _x: [f64; 2], _z: [f64; 2]) -> [f64; 2] {
-        let NoiseHeightsSettings { base, amplitude, .. } = self.settings;
-        [base - amplitude, base + amplitude]
-    }
-}
-
 impl Source for NoiseHeights {
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
-        height_field::fill(self, &self.settings.strata, region, distances, materials);
+        self.landscape.fill(region, distances, materials);
     }
 
     fn bound(&self, region: &SourceRegion) -> Bound {
-        height_field::bound(self, &self.settings.strata, region)
+        self.landscape.bound(region)
+    }
+
+    fn bound_closely(&self, region: &SourceRegion) -> Bound {
+        self.landscape.bound_closely(region)
     }
 }
 
@@ -201,13 +156,13 @@ impl Default for NoiseDensitySettings {
 
 /// Caves and overhangs: there is ground where 3-D noise is below a threshold and, if wished, below the surface of hills.
 ///
-/// The noise is evaluated once per sample, but not above the hills; distances are estimated from its gradient.
+/// The noise is evaluated once per sample, but not above the hills; distances are estimated from its gradient. It is the
+/// [`Landscape`] of hills from which [`Caves`] are subtracted; take that for caves with a coarser lattice.
 #[derive(Clone, Debug, Reflect)]
 #[reflect(opaque)]
 pub struct NoiseDensity {
     settings: NoiseDensitySettings,
-    octaves: Octaves,
-    ground: Option<NoiseHeights>,
+    landscape: Landscape,
 }
 
 impl NoiseDensity {
@@ -216,10 +171,17 @@ impl NoiseDensity {
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
     pub fn new(settings: NoiseDensitySettings) -> Result<Self, SourceError> {
-        settings.noise.validate()?;
-        check("the threshold", "from -1 to 1", settings.threshold, |v| (-1.0..=1.0).contains(&v))?;
-        let ground = settings.ground.clone().map(NoiseHeights::new).transpose()?;
-        Ok(Self { octaves: Octaves::new(&settings.noise), ground, settings })
+        let NoiseDensitySettings { noise, threshold, ground, .. } = &settings;
+        Caves { noise: *noise, threshold: *threshold, ..Caves::default() }.validate()?;
+        ground.as_ref().map_or(Ok(()), NoiseHeightsSettings::validate)?;
+        Ok(Self::of_valid(settings))
+    }
+
+    fn of_valid(settings: NoiseDensitySettings) -> Self {
+        let NoiseDensitySettings { noise, threshold, ground, strata } = &settings;
+        let ground = ground.as_ref().map_or(Solid::Everything, NoiseHeightsSettings::solid);
+        let caves = Caves { noise: *noise, threshold: *threshold, ..Caves::default() };
+        Self { landscape: landscape(ground.subtraction(caves), strata), settings }
     }
 
     /// What it is made of.
@@ -227,98 +189,28 @@ impl NoiseDensity {
         &self.settings
     }
 
-    /// The ground of each column, endless without hills.
-    fn columns(&self, region: &SourceRegion) -> Vec<Column> {
-        match &self.ground {
-            Some(ground) => height_field::columns(ground, region),
-            None => {
-                let endless = Column { height: f64::INFINITY, slope: 0.0 };
-                vec![endless; region.size[0] as usize * region.size[2] as usize]
-            }
-        }
+    /// How often noise was evaluated so far, as of [`Landscape::noise_calls`].
+    pub fn noise_calls(&self) -> u64 {
+        self.landscape.noise_calls()
     }
 }
 
 impl Default for NoiseDensity {
     fn default() -> Self {
-        let settings = NoiseDensitySettings::default();
-        Self { octaves: Octaves::new(&settings.noise), ground: None, settings }
+        Self::of_valid(NoiseDensitySettings::default())
     }
 }
 
 impl Source for NoiseDensity {
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
-        let columns = self.columns(region);
-        let mut noise = NoiseGrid::new(&self.octaves, region);
-        let flattest = self.octaves.typical_gradient() / 4.0;
-        for ([y, z], distances, materials) in rows(region, distances, materials) {
-            let world_y = (f64::from(region.min[1]) + f64::from(y)) * region.spacing;
-            let columns = &columns[region.size[0] as usize * z as usize..];
-            for (x, ((column, distance), material)) in (0u32..).zip(columns.iter().zip(distances).zip(materials)) {
-                let mut nearest = column.distance(world_y - column.height);
-                let mut slope = column.slope;
-                if nearest < ROOM * region.spacing {
-                    let (value, gradient) = noise.sample([x, y, z]);
-                    let [gx, gy, gz] = gradient;
-                    let flat = gx * gx + gz * gz;
-                    let cave = (value - self.settings.threshold) / (flat + gy * gy).sqrt().max(flattest);
-                    if cave > nearest {
-                        nearest = cave;
-                        // Where the noise falls upwards, air is below: this is a ceiling.
-                        slope = if gy > 0.0 { flat.sqrt() / gy } else { f64::INFINITY };
-                    }
-                }
-                *distance = (nearest / region.spacing) as f32;
-                if nearest < 0.0 {
-                    *material = material_at(&self.settings.strata, -nearest, world_y, slope);
-                }
-            }
-        }
+        self.landscape.fill(region, distances, materials);
     }
 
     fn bound(&self, region: &SourceRegion) -> Bound {
-        let [_, [bottom, _], _] = world_box(region);
-        let outside = self.ground.as_ref().is_some_and(|ground| {
-            let [_, highest] = ground.range([0.0; 2], [0.0; 2]);
-            bottom > highest + ROOM * region.spacing
-        });
-        if outside { Bound::Outside } else { Bound::Mixed }
-    }
-}
-
-/// Noise at a region's samples and the layer around them, each evaluated when it is first asked for, and once.
-struct NoiseGrid<'a> {
-    octaves: &'a Octaves,
-    region: &'a SourceRegion,
-    strides: [usize; 3],
-    /// NaN where not evaluated yet.
-    values: Vec<f64>,
-}
-
-impl<'a> NoiseGrid<'a> {
-    fn new(octaves: &'a Octaves, region: &'a SourceRegion) -> Self {
-        let [nx, ny, nz] = region.size.map(|points| points as usize + 2);
-        Self { octaves, region, strides: [1, nx, nx * ny], values: vec![f64::NAN; nx * ny * nz] }
+        self.landscape.bound(region)
     }
 
-    /// The noise at one of the region's samples, and its gradient per world unit by central differences.
-    fn sample(&mut self, local: [u32; 3]) -> (f64, [f64; 3]) {
-        let value = self.value(local, [0; 3]);
-        let gradient = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|step: [i32; 3]| {
-            let change = self.value(local, step) - self.value(local, step.map(|v| -v));
-            change / (2.0 * self.region.spacing)
-        });
-        (value, gradient)
-    }
-
-    fn value(&mut self, local: [u32; 3], step: [i32; 3]) -> f64 {
-        let at = |axis: usize| (i64::from(local[axis]) + i64::from(step[axis]) + 1) as usize;
-        let index: usize = (0..3).map(|axis| at(axis) * self.strides[axis]).sum();
-        if self.values[index].is_nan() {
-            let SourceRegion { min, spacing, .. } = self.region;
-            let position = [0, 1, 2].map(|axis| (f64::from(min[axis]) + at(axis) as f64 - 1.0) * spacing);
-            self.values[index] = self.octaves.get(position);
-        }
-        self.values[index]
+    fn bound_closely(&self, region: &SourceRegion) -> Bound {
+        self.landscape.bound_closely(region)
     }
 }

@@ -237,7 +237,7 @@ impl Sdf {
     }
 
     /// Without the parts that cannot matter within `reach` of `center`: samples there stay the same, bit for bit.
-    fn pruned(&self, center: DVec3, reach: f64) -> Self {
+    pub(super) fn pruned(&self, center: DVec3, reach: f64) -> Self {
         // Two distances that differ by more than this at the centre keep their order all around.
         let apart = 2.0 * reach + (reach + center.length()) * 1e-9;
         let keep_near = |parts: &[Self], filling: f64| {
@@ -279,6 +279,12 @@ impl Sdf {
             }
             Self::Intersection(parts) | Self::Subtraction(parts) => parts.first()?.only_material(),
         }
+    }
+
+    /// The one material that solid points within `reach` of `center` can have; none where there are several.
+    #[cfg(feature = "noise")]
+    pub(super) fn only_material_around(&self, center: DVec3, reach: f64) -> Option<u8> {
+        self.pruned(center, reach).only_material()
     }
 
     fn parts(&self) -> &[Self] {

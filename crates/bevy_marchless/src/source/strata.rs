@@ -40,7 +40,7 @@ impl Default for Stratum {
 }
 
 impl Stratum {
-    fn holds(&self, depth: f64, height: f64, slope: f64) -> bool {
+    pub(crate) fn holds(&self, depth: f64, height: f64, slope: f64) -> bool {
         depth >= self.below_depth && height >= self.above_height && slope >= self.steeper_than
     }
 }

@@ -3,6 +3,10 @@
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
 
+use super::body::BY_RULES;
+use super::parts::{Line, Row};
+use crate::source::octaves::Octaves;
+use crate::source::perlin::NoiseRow;
 use crate::source::{Fractal, SourceError, Stratum, check};
 
 /// One rule of a list that gives the ground its materials: the first rule that holds wins, and where none does the
@@ -68,5 +72,102 @@ impl MaterialRule {
         patches.noise.validate()?;
         check("the threshold of patches", "from -1 to 1", patches.above, |v| (-1.0..=1.0).contains(&v))?;
         Ok(())
+    }
+}
+
+/// A list of [`MaterialRule`], ready to be used.
+pub(super) struct Rules {
+    rules: Vec<Rule>,
+    /// Nothing changes farther below the surface. Units: world.
+    pub(super) deepest: f64,
+}
+
+struct Rule {
+    stratum: Stratum,
+    /// The noise, and above which value the rule holds.
+    patches: Option<(Octaves, f64)>,
+}
+
+impl Rules {
+    /// Of rules that are valid.
+    pub(super) fn new(rules: &[MaterialRule]) -> Self {
+        let depths = rules.iter().map(|rule| rule.stratum.below_depth).filter(|depth| depth.is_finite());
+        let rule = |MaterialRule { stratum, patches }: &MaterialRule| Rule {
+            stratum: *stratum,
+            patches: patches.as_ref().map(|patches| (Octaves::new(&patches.noise), patches.above)),
+        };
+        Self { deepest: depths.fold(0.0, f64::max), rules: rules.iter().map(rule).collect() }
+    }
+
+    /// The one material of all ground between two depths and two heights; none where it may differ.
+    pub(super) fn material_within(&self, depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
+        let mut possible = None;
+        for Rule { stratum, patches } in &self.rules {
+            if !stratum.holds(depth[1], height[1], f64::INFINITY) {
+                continue;
+            }
+            if possible.is_some_and(|material| material != stratum.material) {
+                return None;
+            }
+            possible = Some(stratum.material);
+            if patches.is_none() && stratum.holds(depth[0], height[0], 0.0) {
+                return possible;
+            }
+        }
+        (possible.unwrap_or(0) == 0).then_some(0)
+    }
+
+    /// The rules for rows of these coordinates along x. Units: world.
+    pub(super) fn for_rows<'a>(&'a self, xs: &'a [f64]) -> RowRules<'a> {
+        RowRules { rules: &self.rules, xs, noise: self.rules.iter().map(|_| (false, NoiseRow::default())).collect() }
+    }
+}
+
+/// [`Rules`] for rows of the same x.
+pub(super) struct RowRules<'a> {
+    rules: &'a [Rule],
+    xs: &'a [f64],
+    /// The noise of each rule, and whether it is that of the row at hand.
+    noise: Vec<(bool, NoiseRow)>,
+}
+
+impl RowRules<'_> {
+    /// Gives the solid samples of a row their materials.
+    pub(super) fn give(&mut self, line: &Line, row: &Row, materials: &mut [u8], calls: &mut u64) {
+        self.noise.iter_mut().for_each(|(evaluated, _)| *evaluated = false);
+        for (index, material) in materials.iter_mut().enumerate() {
+            let (distance, up) = (row.distance[index], row.up[index]);
+            if distance >= 0.0 || distance.is_nan() {
+                continue;
+            }
+            *material = match u8::try_from(row.matter[index]) {
+                Ok(material) => material,
+                Err(_) => {
+                    let slope = if up > 0.0 { (1.0 - up * up).max(0.0).sqrt() / up } else { f64::INFINITY };
+                    self.material(index, -distance, line, slope, calls)
+                }
+            };
+        }
+        debug_assert!(row.matter.iter().all(|matter| *matter <= BY_RULES));
+    }
+
+    fn material(&mut self, index: usize, depth: f64, line: &Line, slope: f64, calls: &mut u64) -> u8 {
+        let (rules, xs) = (self.rules, self.xs);
+        for (rule, (evaluated, noise)) in rules.iter().zip(&mut self.noise) {
+            if !rule.stratum.holds(depth, line.y, slope) {
+                continue;
+            }
+            if let Some((octaves, above)) = &rule.patches {
+                if !*evaluated {
+                    *calls += octaves.row_3d(xs, line.y, line.z, noise);
+                    *evaluated = true;
+                }
+                if noise.value[index] <= *above {
+                    continue;
+                }
+            }
+            return rule.stratum.material;
+        }
+        0
     }
 }

@@ -1,0 +1,296 @@
+//! [`Body`]: a [`Solid`] ready to be evaluated, and its bounds.
+
+use core::ops::Range;
+
+use bevy_math::DVec3;
+
+use super::columns::Columns;
+use super::field::Field;
+use super::{Caves, Solid, Tunnels};
+use crate::source::height_field::Column;
+use crate::source::interval::Interval;
+use crate::source::octaves::Octaves;
+use crate::source::{Fractal, Sdf};
+
+/// A [`Solid`] ready to be evaluated.
+pub(super) enum Body {
+    Everything,
+    Ground(Box<Ground>),
+    Noise(Box<Noise>),
+    Shape(Sdf),
+    Union(Vec<Body>),
+    /// The first part, cut by each other one times the sign: 1 for an intersection, −1 for a subtraction.
+    Cut {
+        parts: Vec<Body>,
+        sign: f64,
+    },
+}
+
+/// Everything below a field.
+pub(super) struct Ground {
+    pub(super) columns: Columns,
+    /// Between which heights it lies everywhere.
+    pub(super) range: Interval,
+    /// No column is steeper. Units: rise per run.
+    pub(super) steepest: f64,
+    /// Which one it is, counted through the whole landscape.
+    pub(super) number: usize,
+}
+
+/// Something made of 3-D noise.
+pub(super) struct Noise {
+    pub(super) kind: NoiseKind,
+    /// Every how many samples the noise is evaluated.
+    pub(super) lattice: u32,
+    /// Gradients are taken for at least this steep, so that distances stay small where the noise is flat.
+    pub(super) flattest: f64,
+    /// No gradient is steeper.
+    pub(super) steepest: f64,
+}
+
+pub(super) enum NoiseKind {
+    /// Where it is above the threshold.
+    Caves { noise: Octaves, threshold: f64 },
+    /// Where the length of both is below the width.
+    Tunnels { noises: Box<[Octaves; 2]>, width: f64 },
+}
+
+/// The second noise of tunnels has seeds this far from the first one's.
+const OTHER_SEED: u32 = 0x51ED;
+
+/// A material given by the landscape's rules; others are those of a shape.
+pub(super) const BY_RULES: u16 = 256;
+
+/// A box that is asked about.
+pub(super) struct Region<'a> {
+    /// Its lowest and highest coordinates. Units: world.
+    pub(super) sides: [Interval; 3],
+    /// World units between samples.
+    pub(super) spacing: f64,
+    /// Distances beyond this are all alike. Units: world.
+    pub(super) reach: f64,
+    /// The columns of each ground, by its number, where they are to be looked at: all of them, and which part of them
+    /// lies in the box, along x and z.
+    pub(super) columns: Option<Window<'a>>,
+}
+
+/// A part of the columns of all grounds.
+#[derive(Clone)]
+pub(super) struct Window<'a> {
+    pub(super) columns: &'a [Vec<Column>],
+    /// Columns along x.
+    pub(super) width: usize,
+    pub(super) part: [Range<usize>; 2],
+}
+
+/// What is known of a solid in a box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    /// Between which values all distances lie. Units: world.
+    pub(super) distance: Interval,
+    /// The same with some room to both sides, for what isovalues other than zero need.
+    pub(super) roomy: Interval,
+    /// What solid samples are made of, where that is certain.
+    pub(super) matter: Option<u16>,
+}
+
+impl Known {
+    /// `room`: to either side.
+    fn new(distance: Interval, room: f64, matter: Option<u16>) -> Self {
+        let roomy = Interval { low: distance.low - room, high: distance.high + room };
+        Self { distance, roomy, matter }
+    }
+
+    /// The distances sent through a function of intervals.
+    fn map(self, through: impl Fn(Interval) -> Interval) -> Self {
+        Self { distance: through(self.distance), roomy: through(self.roomy), ..self }
+    }
+}
+
+impl Body {
+    /// Of a solid that is valid. `grounds`: how many there are so far.
+    pub(super) fn new(solid: &Solid, grounds: &mut usize) -> Self {
+        let mut all = |parts: &[Solid]| parts.iter().map(|part| Self::new(part, grounds)).collect::<Vec<_>>();
+        match solid {
+            Solid::Everything => Self::Everything,
+            Solid::Ground(heights) => {
+                let field = Field::new(heights);
+                // Along both axes at once.
+                let steepest = core::f64::consts::SQRT_2 * field.lipschitz();
+                let number = *grounds;
+                *grounds += 1;
+                Self::Ground(Box::new(Ground { range: field.range(), columns: Columns::new(field), steepest, number }))
+            }
+            Solid::Caves(caves) => Self::Noise(Box::new(Noise::caves(caves))),
+            Solid::Tunnels(tunnels) => Self::Noise(Box::new(Noise::tunnels(tunnels))),
+            Solid::Shape(shape) => Self::Shape(shape.clone()),
+            Solid::Union(parts) => Self::Union(all(parts)),
+            Solid::Intersection(parts) => Self::Cut { parts: all(parts), sign: 1.0 },
+            Solid::Subtraction(parts) => Self::Cut { parts: all(parts), sign: -1.0 },
+        }
+    }
+
+    /// All grounds, in the order of their numbers.
+    pub(super) fn grounds(&self) -> Vec<&Ground> {
+        match self {
+            Self::Ground(ground) => vec![ground],
+            Self::Everything | Self::Noise(_) | Self::Shape(_) => Vec::new(),
+            Self::Union(parts) | Self::Cut { parts, .. } => parts.iter().flat_map(Self::grounds).collect(),
+        }
+    }
+
+    /// What is known of it in a box. `noisily`: whether to evaluate noise for it, once for each noise.
+    pub(super) fn known(&self, region: &Region, noisily: bool, calls: &mut u64) -> Known {
+        match self {
+            Self::Everything => Known::new(Interval::exactly(f64::NEG_INFINITY), 0.0, Some(BY_RULES)),
+            Self::Ground(ground) => ground.known(region, noisily, calls),
+            Self::Noise(noise) => Known::new(noise.distance(region, noisily, calls), region.room(), Some(BY_RULES)),
+            Self::Shape(shape) => {
+                let (center, radius) = region.ball();
+                let distance = shape.sample(center).0;
+                let rounding = 1e-9 * (distance.abs() + radius + center.length());
+                let more = radius + if rounding.is_finite() { rounding } else { 0.0 };
+                let distance = Interval { low: distance - more, high: distance + more };
+                let material = if distance.low < 0.0 { shape.only_material_around(center, radius) } else { None };
+                Known::new(distance, region.room(), material.map(u16::from))
+            }
+            Self::Union(parts) => {
+                let parts = parts.iter().map(|part| part.known(region, noisily, calls).map(|d| far(d, region.reach)));
+                parts.reduce(nearer).unwrap_or(AIR)
+            }
+            Self::Cut { parts, sign } => {
+                let Some((first, others)) = parts.split_first() else { return AIR };
+                others.iter().fold(first.known(region, noisily, calls), |so_far, other| {
+                    // Where the solid is far already, nobody asks whether it is cut.
+                    let room = region.room();
+                    if so_far.distance.low >= room {
+                        return so_far;
+                    }
+                    let signed = |d: Interval| if *sign < 0.0 { d.negated() } else { d };
+                    let cut = other.known(region, noisily, calls).map(|d| deep(signed(d), region.reach));
+                    let mut distance = so_far.distance.max(cut.distance);
+                    if so_far.distance.high >= room {
+                        distance.low = distance.low.min(room);
+                    }
+                    Known { distance, roomy: so_far.roomy.max(cut.roomy), matter: so_far.matter }
+                })
+            }
+        }
+    }
+}
+
+/// Nothing at all.
+const AIR: Known = {
+    let far = Interval { low: f64::INFINITY, high: f64::INFINITY };
+    Known { distance: far, roomy: far, matter: Some(BY_RULES) }
+};
+
+/// What lies in either of two solids.
+fn nearer(a: Known, b: Known) -> Known {
+    let matter = if b.distance.low >= 0.0 || a.distance.high < b.distance.low || a.matter == b.matter {
+        a.matter
+    } else if a.distance.low >= 0.0 || b.distance.high < a.distance.low {
+        b.matter
+    } else {
+        None
+    };
+    Known { distance: a.distance.min(b.distance), roomy: a.roomy.min(b.roomy), matter }
+}
+
+/// Distances that are out of reach are endless.
+fn far(distance: Interval, reach: f64) -> Interval {
+    distance.through(|d| if d >= reach { f64::INFINITY } else { d })
+}
+
+/// Depths that are out of reach are endless.
+fn deep(distance: Interval, reach: f64) -> Interval {
+    distance.through(|d| if d <= -reach { f64::NEG_INFINITY } else { d })
+}
+
+impl Region<'_> {
+    /// How far from the surface chunks are left out. Units: world.
+    pub(super) fn room(&self) -> f64 {
+        crate::source::ROOM * self.spacing
+    }
+
+    /// The smallest ball around the box.
+    pub(super) fn ball(&self) -> (DVec3, f64) {
+        let [center, half] = [Interval::middle, Interval::half].map(|of| DVec3::from(self.sides.map(of)));
+        (center, half.length())
+    }
+}
+
+impl Ground {
+    fn known(&self, region: &Region, noisily: bool, calls: &mut u64) -> Known {
+        let [x, y, z] = region.sides;
+        let Some(window) = &region.columns else {
+            let heights =
+                if noisily { self.columns.field().within(x, z, calls).within(self.range) } else { self.range };
+            let above = y.plus(heights.negated());
+            let flat = 1.0 / (1.0 + self.steepest * self.steepest).sqrt();
+            // A slope makes distances smaller, and keeps their sign.
+            let low = if above.low > 0.0 { above.low * flat } else { above.low };
+            let high = if above.high < 0.0 { above.high * flat } else { above.high };
+            let room = region.room();
+            let roomy = Interval { low: above.low - room, high: above.high + room };
+            return Known { distance: Interval { low, high }, roomy, matter: Some(BY_RULES) };
+        };
+        let (mut distance, mut roomy) = (Interval::NOTHING, Interval::NOTHING);
+        for row in window.part[1].clone() {
+            let columns = &window.columns[self.number][window.width * row..];
+            for column in &columns[window.part[0].clone()] {
+                let lengthened = (1.0 + column.slope * column.slope).sqrt();
+                let [low, high] = [y.low, y.high].map(|y| (y - column.height) / lengthened);
+                // So that samples `ROOM` farther in are `ROOM` from the surface by their own measure.
+                let room = region.room() * (1.0 - 1.0 / lengthened);
+                distance = Interval { low: distance.low.min(low), high: distance.high.max(high) };
+                roomy = Interval { low: roomy.low.min(low - room), high: roomy.high.max(high + room) };
+            }
+        }
+        Known { distance, roomy, matter: Some(BY_RULES) }
+    }
+}
+
+impl Noise {
+    fn caves(caves: &Caves) -> Self {
+        let noise = Octaves::new(&caves.noise);
+        let (flattest, steepest) = (noise.typical_gradient() / 4.0, noise.lipschitz_3d());
+        let kind = NoiseKind::Caves { noise, threshold: caves.threshold };
+        Self { kind, lattice: caves.lattice, flattest, steepest }
+    }
+
+    fn tunnels(tunnels: &Tunnels) -> Self {
+        let other = Fractal { seed: tunnels.noise.seed.wrapping_add(OTHER_SEED), ..tunnels.noise };
+        let noises = [&tunnels.noise, &other].map(Octaves::new);
+        let typical = noises[0].typical_gradient();
+        let steepest = core::f64::consts::SQRT_2 * noises[0].lipschitz_3d();
+        let kind = NoiseKind::Tunnels { noises: Box::new(noises), width: tunnels.radius * typical };
+        Self { kind, lattice: tunnels.lattice, flattest: typical / 4.0, steepest }
+    }
+
+    /// Between which values distances lie.
+    fn distance(&self, region: &Region, noisily: bool, calls: &mut u64) -> Interval {
+        let (center, radius) = region.ball();
+        // Interpolated noise is made of noise as far away as the lattice is wide.
+        let more = if self.lattice > 1 { f64::from(self.lattice) * region.spacing * 3.0_f64.sqrt() } else { 0.0 };
+        let mut around = |octaves: &Octaves| {
+            if !noisily {
+                return octaves.range();
+            }
+            let (interval, more) = octaves.around(center.to_array(), radius + more);
+            *calls += more;
+            interval
+        };
+        let above = match &self.kind {
+            NoiseKind::Caves { noise, threshold } => Interval::exactly(*threshold).plus(around(noise).negated()),
+            NoiseKind::Tunnels { noises, width } => {
+                let [a, b] = [&noises[0], &noises[1]].map(|noise| around(noise).abs());
+                let length = Interval { low: a.low.hypot(b.low), high: f64::INFINITY };
+                length.plus(Interval::exactly(-width))
+            }
+        };
+        let [low, high] = [(above.low, above.low < 0.0), (above.high, above.high > 0.0)]
+            .map(|(above, outer)| above / if outer { self.flattest } else { self.steepest });
+        Interval { low, high }
+    }
+}

@@ -1,0 +1,120 @@
+//! [`Columns`]: the heights of a ground, each evaluated once and kept for the chunks above and below.
+
+use core::mem;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use marchless::SourceRegion;
+
+use super::field::{Field, Places};
+use crate::source::height_field::Column;
+
+/// Columns along a side of a tile.
+const TILE: i64 = 16;
+
+/// So many parts of the cache are locked apart from each other.
+const SHARDS: usize = 8;
+
+/// A shard holds at most twice as many tiles: the cache of one ground stays below 8 · 2 · 512 · 2 KB = 16 MB, which
+/// is a square of 90 tiles or 1,448 columns.
+const TILES_PER_GENERATION: usize = 512;
+
+/// The heights of [`TILE`]² columns, x fastest; evaluated by whoever asks first, while others wait.
+type Tile = Arc<OnceLock<Box<[f64]>>>;
+
+/// Where a tile lies, in tiles, and the spacing of its columns.
+type Key = (i64, i64, u64);
+
+/// The heights of one ground.
+///
+/// Tiles lie at multiples of 16 columns, whatever the chunks are: so a height is evaluated once, for all regions.
+pub(super) struct Columns {
+    field: Field,
+    shards: [Mutex<Shard>; SHARDS],
+}
+
+/// Two generations of tiles: those of the older one that nobody asks for are dropped when the younger one is full.
+#[derive(Default)]
+struct Shard {
+    young: HashMap<Key, Tile>,
+    old: HashMap<Key, Tile>,
+}
+
+impl Shard {
+    fn tile(&mut self, key: Key) -> Tile {
+        if let Some(tile) = self.young.get(&key) {
+            return tile.clone();
+        }
+        let tile = self.old.remove(&key).unwrap_or_default();
+        if self.young.len() >= TILES_PER_GENERATION {
+            self.old = mem::take(&mut self.young);
+        }
+        self.young.insert(key, tile.clone());
+        tile
+    }
+}
+
+impl Columns {
+    pub(super) fn new(field: Field) -> Self {
+        Self { field, shards: Default::default() }
+    }
+
+    pub(super) fn field(&self) -> &Field {
+        &self.field
+    }
+
+    /// The ground of each column of a region, x fastest. Slopes are central differences, and so depend on nothing but
+    /// the column's position and the spacing.
+    pub(super) fn of(&self, region: &SourceRegion, calls: &mut u64) -> Vec<Column> {
+        let [nx, nz] = [0, 2].map(|axis| region.size[axis] as usize);
+        let width = nx + 2;
+        let heights = self.heights(region, calls);
+        let run = 2.0 * region.spacing;
+        let indices = (0..nz).flat_map(|z| (0..nx).map(move |x| x + 1 + width * (z + 1)));
+        indices
+            .map(|index| {
+                let along_x = (heights[index + 1] - heights[index - 1]) / run;
+                let along_z = (heights[index + width] - heights[index - width]) / run;
+                Column { height: heights[index], slope: (along_x * along_x + along_z * along_z).sqrt() }
+            })
+            .collect()
+    }
+
+    /// The heights of a region's columns and of the ring around them, x fastest.
+    fn heights(&self, region: &SourceRegion, calls: &mut u64) -> Vec<f64> {
+        let low = [0, 2].map(|axis| i64::from(region.min[axis]) - 1);
+        let size = [0, 2].map(|axis| i64::from(region.size[axis]) + 2);
+        let mut heights = vec![0.0; (size[0] * size[1]) as usize];
+        let tiles = |axis: usize| low[axis].div_euclid(TILE)..=(low[axis] + size[axis] - 1).div_euclid(TILE);
+        for (tile_x, tile_z) in tiles(1).flat_map(|z| tiles(0).map(move |x| (x, z))) {
+            let tile = self.tile((tile_x, tile_z, region.spacing.to_bits()));
+            let tile = tile.get_or_init(|| self.evaluate([tile_x, tile_z], region.spacing, calls));
+            let common = |axis: usize, tile: i64| {
+                let first = (tile * TILE).max(low[axis]);
+                first..(tile * TILE + TILE).min(low[axis] + size[axis]).max(first)
+            };
+            let [xs, zs] = [common(0, tile_x), common(1, tile_z)];
+            let len = (xs.end - xs.start) as usize;
+            for z in zs {
+                let from = (xs.start - tile_x * TILE + TILE * (z - tile_z * TILE)) as usize;
+                let to = (xs.start - low[0] + size[0] * (z - low[1])) as usize;
+                heights[to..to + len].copy_from_slice(&tile[from..from + len]);
+            }
+        }
+        heights
+    }
+
+    fn tile(&self, key: Key) -> Tile {
+        let shard = (key.0.wrapping_mul(5).wrapping_add(key.1.wrapping_mul(3))).rem_euclid(SHARDS as i64) as usize;
+        // A shard is whole at all times, so a panic elsewhere while it was locked left nothing undone.
+        self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner).tile(key)
+    }
+
+    fn evaluate(&self, tile: [i64; 2], spacing: f64, calls: &mut u64) -> Box<[f64]> {
+        let [xs, zs] =
+            tile.map(|tile| (0..TILE).map(|index| (tile * TILE + index) as f64 * spacing).collect::<Vec<_>>());
+        let mut heights = vec![0.0; (TILE * TILE) as usize];
+        self.field.values(&Places::Grid { xs: &xs, zs: &zs }, &mut heights, calls);
+        heights.into()
+    }
+}
