@@ -40,7 +40,7 @@ pub(super) struct Line<'a> {
 pub(super) enum Part<'a> {
     Everything,
     Ground(&'a [Column]),
-    Noise(Samples<'a>),
+    Noise(Box<Samples<'a>>),
     Shape(Sdf),
     Union { parts: Vec<Part<'a>>, row: Row },
     Cut { parts: Vec<Part<'a>>, sign: f64, row: Row },
@@ -65,7 +65,7 @@ impl<'a> Part<'a> {
         match body {
             Body::Everything => Self::Everything,
             Body::Ground(ground) => Self::Ground(&columns[ground.number]),
-            Body::Noise(noise) => Self::Noise(Samples::new(noise, samples)),
+            Body::Noise(noise) => Self::Noise(Box::new(Samples::new(noise, samples))),
             Body::Shape(shape) => {
                 let (center, radius) = region.ball();
                 Self::Shape(shape.pruned(center, radius + samples.spacing))
