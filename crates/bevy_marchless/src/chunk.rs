@@ -41,7 +41,6 @@ impl ChunkKey {
     }
 
     /// The 3 × 3 × 3 chunks around it, itself included, of the same level.
-    #[expect(dead_code, reason = "what streams uses it")]
     pub(crate) fn around(self) -> impl Iterator<Item = Self> {
         let Self { level, position } = self;
         let region = Region::new(position.map(|v| v.saturating_sub(1)), position.map(|v| v.saturating_add(2)));

@@ -10,8 +10,10 @@ use bevy_ecs::prelude::*;
 pub use gizmos::{ChunkBoundsGizmos, ShowChunkBounds};
 
 use crate::chunk::ChunkGeometry;
+use crate::mesh::geometry_bytes;
 use crate::schedule::MarchlessSystems;
-use crate::stats::Stats;
+use crate::stats::{MainThread, Stats};
+use crate::stream::StreamStats;
 use crate::terrain::TerrainVolume;
 
 /// Measures the plugin's work in Bevy's `DiagnosticsStore`, and with the feature `gizmos` draws the bounds of chunks.
@@ -75,8 +77,12 @@ fn measure(
     geometries: Query<&ChunkGeometry>,
     volumes: Query<&TerrainVolume>,
     mut stats: ResMut<Stats>,
+    mut stream: ResMut<StreamStats>,
+    mut main_thread: ResMut<MainThread>,
     mut diagnostics: Diagnostics,
 ) {
+    let main_thread = main_thread.take();
+    (stream.main_thread, stream.main_thread_last) = (stream.main_thread + main_thread, main_thread);
     let drawn = || geometries.iter().filter(|geometry| !geometry.mesh.is_empty());
     diagnostics.add_measurement(&DebugPlugin::CHUNKS, || drawn().count() as f64);
     let triangles = || drawn().map(|geometry| geometry.mesh.triangle_count()).sum::<usize>();
@@ -85,7 +91,19 @@ fn measure(
     diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || unfilled() as f64);
     let unmeshed = || volumes.iter().map(TerrainVolume::waiting_for_meshes).sum::<usize>();
     diagnostics.add_measurement(&DebugPlugin::MESH_QUEUE, || unmeshed() as f64);
+    let waiting = || volumes.iter().map(TerrainVolume::waiting).sum::<usize>();
+    diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || waiting() as f64);
     let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
+    diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(main_thread));
+    if stats.update % 64 == 1 {
+        let samples: usize = volumes.iter().map(TerrainVolume::sample_bytes).sum();
+        let bytes = samples + drawn().map(|geometry| geometry_bytes(&geometry.mesh)).sum::<usize>();
+        diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes as f64);
+        let count = drawn().count();
+        if count > 0 {
+            diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes as f64 / count as f64);
+        }
+    }
     let meshed = core::mem::take(&mut stats.meshed);
     let mesh_time = core::mem::take(&mut stats.mesh_time);
     if meshed > 0 {

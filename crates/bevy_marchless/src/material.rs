@@ -32,10 +32,11 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
         app.world_mut().resource_mut::<MaterialTypes>().0.push(component);
         app.add_observer(take_away_material::<M>).add_systems(
             PostUpdate,
+            // In the update in which a chunk is spawned: without a material it would not be drawn.
             hand_on_material::<M>
-                .in_set(MarchlessSystems::Prepare)
-                .after(crate::terrain::prepare_terrains)
-                .after(give_default_material),
+                .in_set(MarchlessSystems::Work)
+                .after(MarchlessSystems::Mesh)
+                .before(MarchlessSystems::Report),
         );
     }
 }
@@ -97,16 +98,24 @@ fn take_away_plain_material(
 
 /// Gives the chunks of changed terrains, and new chunks, their terrain's material.
 fn hand_on_material<M: Material>(
-    chunks: Query<(Entity, Ref<Chunk>)>,
-    terrains: Query<Ref<MeshMaterial3d<M>>, With<Terrain>>,
+    new: Query<(Entity, &Chunk), Added<Chunk>>,
+    chunks: Query<(Entity, &Chunk)>,
+    terrains: Query<&MeshMaterial3d<M>, With<Terrain>>,
+    changed: Query<(), (Changed<MeshMaterial3d<M>>, With<Terrain>)>,
     mut commands: Commands,
 ) {
-    for (entity, chunk) in &chunks {
-        if let Ok(material) = terrains.get(chunk.terrain)
-            && (chunk.is_added() || material.is_changed())
-        {
+    let mut hand_on = |(entity, chunk): (Entity, &Chunk)| {
+        if let Ok(material) = terrains.get(chunk.terrain) {
             commands.entity(entity).try_insert(MeshMaterial3d(material.0.clone()));
         }
+    };
+    if changed.is_empty() {
+        new.iter().for_each(hand_on);
+    } else {
+        chunks
+            .iter()
+            .filter(|(entity, chunk)| changed.contains(chunk.terrain) || new.contains(*entity))
+            .for_each(&mut hand_on);
     }
 }
 

@@ -10,8 +10,9 @@
 mod handmade;
 mod job;
 
+use core::cmp::Reverse;
+use core::time::Duration;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_asset::Assets;
@@ -19,16 +20,18 @@ use bevy_camera::visibility::NoAutoAabb;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
-use marchless::Chunk;
+use bevy_platform::time::Instant;
+use marchless::MeshBuffer;
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
 pub(crate) use job::{Colors, Meshed};
 use job::{MeshJob, mesh_now};
 
-use crate::chunk::{ChunkGeometry, mesh_bounds};
+use crate::chunk::{ChunkGeometry, ChunkKey, mesh_bounds, new_chunk};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
-use crate::stats::Stats;
-use crate::terrain::{Group, Pending, TerrainVolume, around, distance_to_middle};
+use crate::stats::{MainThread, Stats};
+use crate::stream::{StreamStats, Wanted, in_flight};
+use crate::terrain::{Group, Pending, TerrainVolume, same_samples};
 use crate::work::{Priority, Results, WorkQueue};
 
 /// The number of a vertex's material, a `u32`, for shaders.
@@ -66,6 +69,7 @@ struct Screen<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
     stats: ResMut<'w, Stats>,
+    stream: ResMut<'w, StreamStats>,
 }
 
 impl Screen<'_, '_> {
@@ -79,6 +83,22 @@ impl Screen<'_, '_> {
             _ => entity.try_remove::<Mesh3d>(),
         };
     }
+
+    /// Spawns a chunk with its mesh, which is not empty.
+    fn spawn(&mut self, chunk: impl Bundle, meshed: Meshed, cells: [u32; 3]) -> Entity {
+        let bounds = mesh_bounds(&meshed.geometry, cells);
+        let mut entity = self.commands.spawn((chunk, ChunkGeometry { mesh: meshed.geometry }, bounds));
+        if let (Some(assets), Some(mesh)) = (&mut self.assets, meshed.mesh) {
+            entity.insert(Mesh3d(assets.add(mesh)));
+        }
+        entity.id()
+    }
+
+    fn count_mesh(&mut self, time: Duration) {
+        self.stats.count_mesh(time);
+        self.stream.meshed += 1;
+        self.stream.mesh_time += time;
+    }
 }
 
 /// Shows the groups that are complete, and starts new ones.
@@ -86,28 +106,50 @@ fn mesh_terrains(
     mut volumes: Query<(Entity, &mut TerrainVolume)>,
     queue: Res<WorkQueue>,
     results: Res<MeshResults>,
+    mut waiting: Local<Vec<MeshResult>>,
     settings: Res<MarchlessSettings>,
+    mut main_thread: ResMut<MainThread>,
     mut screen: Screen,
 ) {
-    for MeshResult { terrain, group, meshed } in results.0.take() {
-        screen.stats.count_mesh(meshed.time);
+    let start = main_thread.start();
+    let (mut bytes, until) = (0, main_thread.until(start, settings.main_thread));
+    waiting.extend(results.0.take());
+    for result in core::mem::take(&mut *waiting) {
+        let MeshResult { terrain, group, .. } = result;
         let Ok((_, mut volume)) = volumes.get_mut(terrain) else { continue };
         let Some(unfinished) = volume.groups.get_mut(&group) else { continue };
+        // New chunks may come one by one; an edit is shown as a whole.
+        if unfinished.withdrawable && (bytes > settings.upload_bytes || bytes > 0 && Instant::now() > until) {
+            waiting.push(result);
+            continue;
+        }
+        let meshed = result.meshed;
+        bytes += geometry_bytes(&meshed.geometry);
+        screen.count_mesh(meshed.time);
         unfinished.meshed.push(meshed);
         if unfinished.meshed.len() == unfinished.members
             && let Some(group) = volume.take_group(group)
         {
-            show_group(&mut volume, group, &mut screen);
+            show_group(terrain, &mut volume, group, &mut screen);
         }
     }
     for (terrain, mut volume) in &mut volumes {
         if !volume.ready.is_empty() || !volume.pending.is_empty() {
             let mut start = Start { terrain, queue: &queue, results: &results, screen: &mut screen, inline: 0 };
-            start.ready_chunks(&mut volume);
+            start.ready_chunks(&mut volume, &settings, until);
             start.inline = settings.inline_chunks;
             start.pending_chunks(&mut volume);
         }
     }
+    main_thread.stop(start);
+}
+
+/// How many bytes a mesh takes, in memory and, or about so, on the graphics card.
+pub(crate) fn geometry_bytes(mesh: &MeshBuffer) -> usize {
+    size_of_val(&mesh.positions[..])
+        + size_of_val(&mesh.normals[..])
+        + size_of_val(&mesh.materials[..])
+        + size_of_val(&mesh.indices[..])
 }
 
 /// Starting the groups of one terrain.
@@ -122,22 +164,50 @@ struct Start<'a, 'w, 's> {
 
 impl Start<'_, '_, '_> {
     /// Starts the chunks that can be meshed for the first time, one by one; those without a surface need no job.
-    fn ready_chunks(&mut self, volume: &mut TerrainVolume) {
-        let mut uniform = BTreeSet::new();
-        for position in core::mem::take(&mut volume.ready) {
-            if volume.pending.iter().any(|pending| pending.chunks.contains(&position)) {
-                // It will be meshed with them.
-            } else if volume.claims.contains_key(&position) {
-                volume.ready.insert(position);
-            } else if volume.grid.neighbourhood(position).is_uniform() {
-                uniform.insert(position);
+    fn ready_chunks(&mut self, volume: &mut TerrainVolume, settings: &MarchlessSettings, until: Instant) {
+        let limit = in_flight(settings);
+        let mut ready = core::mem::take(&mut volume.ready);
+        if volume.first_meshes + ready.len() > limit {
+            let ranges = volume.streaming.ranges();
+            // Those that come first are at the end.
+            ready.sort_by_cached_key(|key| Reverse(ranges.urgency(key.position)));
+        }
+        let mut no_longer_drawn = BTreeSet::new();
+        let (mut done, mut later) = (0, Vec::new());
+        while let Some(key) = ready.pop() {
+            let Some(state) = volume.chunks.get_mut(&key) else { continue };
+            let is_ready = state.wanted == Wanted::Mesh && state.missing == 0 && (!state.drawn || state.stale);
+            if !is_ready || volume.pending.iter().any(|pending| pending.chunks.contains(&key)) {
+                // Gone, or meshed already; or it will be, with the changed ones.
+                continue;
+            }
+            if volume.claims.contains_key(&key) {
+                later.push(key);
+            } else if volume.grid.neighbourhood(key.position).is_uniform() {
+                if state.empty {
+                    (state.drawn, state.stale) = (true, false);
+                    volume.streaming.may_drop_more = true;
+                    if let Some(chunk) = volume.grid.chunk(key.position) {
+                        volume.shown.load(key.position, chunk.clone()).expect("a chunk of the same extent");
+                    }
+                } else {
+                    no_longer_drawn.insert(key);
+                }
+            } else if volume.first_meshes < limit {
+                let urgency = volume.streaming.ranges().urgency(key.position);
+                let pending = Pending { chunks: BTreeSet::from([key]), since: None };
+                self.group(volume, pending, Priority::FirstMesh(urgency));
             } else {
-                let distance = volume.settings.as_ref().map_or(0, |terrain| distance_to_middle(terrain, position));
-                let pending = Pending { chunks: BTreeSet::from([position]), since: None };
-                self.group(volume, pending, Priority::FirstMesh(distance));
+                later.push(key);
+            }
+            done += 1;
+            if done % 16 == 0 && Instant::now() >= until {
+                break;
             }
         }
-        self.group(volume, Pending { chunks: uniform, since: None }, Priority::Edit);
+        volume.ready.append(&mut ready);
+        volume.ready.append(&mut later);
+        self.group(volume, Pending { chunks: no_longer_drawn, since: None }, Priority::Edit);
     }
 
     /// Starts the changed chunks that no group is working on.
@@ -166,22 +236,29 @@ impl Start<'_, '_, '_> {
             meshed: Vec::new(),
         };
         let mut jobs = Vec::new();
-        for &position in &group.chunks {
-            if volume.chunks.get(&position).is_none_or(|state| state.missing > 0 || state.entity.is_none()) {
+        for key in &group.chunks {
+            let Some(state) = volume.chunks.get_mut(key) else { continue };
+            if state.wanted != Wanted::Mesh || state.hidden {
+                continue;
+            }
+            if state.missing > 0 {
+                // It comes as soon as its surroundings have been filled.
+                state.stale = state.drawn;
+                volume.streaming.look_at(*key);
                 continue;
             }
             group.members += 1;
-            for neighbour in around(position) {
-                if let Some(chunk) = volume.grid.chunk(neighbour) {
-                    group.snapshot.entry(neighbour).or_insert_with(|| chunk.clone());
+            for neighbour in key.around() {
+                if let Some(chunk) = volume.grid.chunk(neighbour.position) {
+                    group.snapshot.entry(neighbour.position).or_insert_with(|| chunk.clone());
                 }
             }
-            let samples = volume.grid.neighbourhood(position);
+            let samples = volume.grid.neighbourhood(key.position);
             if samples.is_uniform() {
-                group.meshed.push(Meshed::empty(position));
+                group.meshed.push(Meshed::empty(key.position));
             } else {
                 let colors = self.screen.assets.is_some().then(|| colors.clone());
-                jobs.push(MeshJob { position, samples, settings, colors });
+                jobs.push(MeshJob { position: key.position, samples, settings, colors });
             }
         }
         if group.members == 0 {
@@ -189,13 +266,14 @@ impl Start<'_, '_, '_> {
         }
         if jobs.len() <= self.inline {
             for meshed in mesh_now(jobs) {
-                self.screen.stats.count_mesh(meshed.time);
+                self.screen.count_mesh(meshed.time);
                 group.meshed.push(meshed);
             }
-            show_group(volume, group, self.screen);
+            show_group(self.terrain, volume, group, self.screen);
             return;
         }
         let id = volume.claim(&group.chunks);
+        volume.first_meshes += usize::from(group.withdrawable);
         for job in jobs {
             let (terrain, results) = (self.terrain, self.results.0.clone());
             let run = move || results.push(MeshResult { terrain, group: id, meshed: job.run() });
@@ -206,37 +284,33 @@ impl Start<'_, '_, '_> {
 }
 
 /// Shows all chunks of a complete group.
-fn show_group(volume: &mut TerrainVolume, group: Group, screen: &mut Screen) {
-    let cells = [volume.grid.chunk_cells(); 3];
+fn show_group(terrain: Entity, volume: &mut TerrainVolume, group: Group, screen: &mut Screen) {
+    let Some(voxel_size) = volume.settings.as_ref().map(|settings| settings.voxel_size) else { return };
+    let cells = volume.grid.chunk_cells();
     for meshed in group.meshed {
-        let Some(state) = volume.chunks.get_mut(&meshed.position) else { continue };
+        let key = ChunkKey::finest(meshed.position);
+        let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.wanted == Wanted::Mesh) else { continue };
         let (was_empty, is_empty) = (state.empty, meshed.geometry.is_empty());
-        (state.drawn, state.empty) = (true, is_empty);
-        if let Some(entity) = state.entity
-            && !(was_empty && is_empty)
-        {
-            screen.show(entity, meshed, cells);
+        (state.drawn, state.empty, state.stale) = (true, is_empty, false);
+        match state.entity {
+            Some(entity) if !(was_empty && is_empty) => screen.show(entity, meshed, [cells; 3]),
+            None if !is_empty && !state.hidden => {
+                state.entity = Some(screen.spawn(new_chunk(terrain, key, cells, voxel_size), meshed, [cells; 3]));
+            }
+            _ => {}
         }
     }
     for (position, chunk) in group.snapshot {
-        let is_drawn = volume.chunks.get(&position).is_some_and(|state| state.drawn);
+        let key = ChunkKey::finest(position);
+        let Some(state) = volume.chunks.get(&key) else { continue };
         let is_new = || !volume.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk));
-        if (group.chunks.contains(&position) || !is_drawn) && is_new() {
-            volume.shown.insert(position, chunk).expect("a chunk of the same extent");
+        if (group.chunks.contains(&key) || !state.drawn) && is_new() {
+            volume.shown.load(position, chunk).expect("a chunk of the same extent");
         }
     }
-    volume.shown.take_dirty();
     volume.shown_isovalue = group.isovalue;
+    volume.streaming.may_drop_more = true;
     if let Some(since) = group.since {
         screen.stats.edit_is_visible(since);
-    }
-}
-
-/// Whether two chunks are known to be the same without looking at their samples.
-fn same_samples(a: &Chunk<i16>, b: &Chunk<i16>) -> bool {
-    match (a, b) {
-        (Chunk::Uniform(a), Chunk::Uniform(b)) => a == b,
-        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
-        _ => false,
     }
 }

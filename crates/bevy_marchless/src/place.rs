@@ -13,18 +13,32 @@ pub(crate) struct Place {
 }
 
 impl PlaceItem<'_, '_> {
+    /// Whether it is exact however far from the origin: then world space is relative to a floating origin, and only
+    /// propagated transforms can be compared with it.
+    pub(crate) fn is_floating(&self) -> bool {
+        #[cfg(feature = "big_space")]
+        return self.grid.is_some();
+        #[cfg(not(feature = "big_space"))]
+        false
+    }
+
     /// From the terrain's own space (world units from its lattice's origin, so voxels times the voxel size) to world space.
     pub(crate) fn to_world(&self) -> DAffine3 {
         #[cfg(feature = "big_space")]
         if let Some(grid) = self.grid {
             return crate::big_space::grid_to_world(grid);
         }
-        let affine = self.transform.affine();
-        DAffine3 { matrix3: affine.matrix3.as_dmat3(), translation: affine.translation.as_dvec3() }
+        in_double_precision(self.transform)
     }
 
     /// From world space to the terrain's own; not finite where the terrain is scaled to nothing.
     pub(crate) fn to_terrain(&self) -> DAffine3 {
         self.to_world().inverse()
     }
+}
+
+/// A transform in double precision.
+pub(crate) fn in_double_precision(transform: &GlobalTransform) -> DAffine3 {
+    let affine = transform.affine();
+    DAffine3 { matrix3: affine.matrix3.as_dmat3(), translation: affine.translation.as_dvec3() }
 }

@@ -6,8 +6,9 @@ use bevy_math::{DVec3, IVec3, Ray3d, Vec3};
 use bevy_reflect::prelude::*;
 use marchless::Region;
 
+use crate::chunk::ChunkKey;
 use crate::place::{Place, PlaceItem};
-use crate::terrain::TerrainVolume;
+use crate::terrain::{ChunkState, TerrainVolume};
 
 /// Questions to all terrains, in world space.
 ///
@@ -72,7 +73,7 @@ impl TerrainQuery<'_, '_> {
         let corner = lattice.floor().as_ivec3();
         let ends = [corner, corner.saturating_add(IVec3::ONE)];
         let [low, high] = ends.map(|end| volume.grid.chunk_of(end.to_array()));
-        let unfilled = |chunk| volume.chunks.get(&chunk).is_some_and(|state| !state.is_filled());
+        let unfilled = |chunk| is_unfilled(volume, chunk);
         if Region::new(low, high.map(|v| v + 1)).points().any(unfilled) {
             return None;
         }
@@ -95,6 +96,13 @@ impl TerrainQuery<'_, '_> {
     }
 }
 
+/// Whether the samples of a chunk of the terrain's extent are not there: it is not filled yet, not loaded, or they were dropped.
+fn is_unfilled(volume: &TerrainVolume, chunk: [i32; 3]) -> bool {
+    let is_filled = volume.chunks.get(&ChunkKey::finest(chunk)).is_none_or(ChunkState::is_filled);
+    let is_there = is_filled && volume.grid.chunk(chunk).is_some();
+    !is_there && volume.grid.bounds().is_none_or(|bounds| bounds.contains(chunk))
+}
+
 fn cast(
     (terrain, volume, place): (Entity, &TerrainVolume, PlaceItem),
     ray: Ray3d,
@@ -113,7 +121,8 @@ fn cast(
         let from = origin + direction * start;
         let (shown, isovalue) = (&volume.shown, volume.shown_isovalue);
         let hit = marchless::ray_cast(shown, isovalue, from.to_array(), direction.to_array(), reach - start)?;
-        let drawn = volume.chunks.get(&hit.chunk).filter(|state| state.drawn).and_then(|state| state.entity);
+        let drawn =
+            volume.chunks.get(&ChunkKey::finest(hit.chunk)).filter(|state| state.drawn).and_then(|state| state.entity);
         let Some(chunk) = drawn else {
             // The samples of a chunk that is not drawn yet, known for the sake of its neighbours: on behind them.
             start += hit.distance + 1e-3;

@@ -50,6 +50,33 @@ impl Since {
     }
 }
 
+/// How long the plugin's systems have taken in this update.
+#[derive(Resource, Debug, Default)]
+pub(crate) struct MainThread(Duration);
+
+impl MainThread {
+    /// A system begins.
+    pub(crate) fn start(&self) -> Instant {
+        Instant::now()
+    }
+
+    /// It ends.
+    pub(crate) fn stop(&mut self, start: Instant) {
+        self.0 += start.elapsed();
+    }
+
+    /// Until when a system that has begun at `start` may go on, if all of the update's systems so far are to take this
+    /// long.
+    pub(crate) fn until(&self, start: Instant, all: Duration) -> Instant {
+        start + all.saturating_sub(self.0)
+    }
+
+    /// The update's time; from now on, the next update's.
+    pub(crate) fn take(&mut self) -> Duration {
+        core::mem::take(&mut self.0)
+    }
+}
+
 pub(crate) fn count_update(mut stats: ResMut<Stats>) {
     stats.update += 1;
 }

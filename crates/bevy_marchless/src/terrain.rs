@@ -20,14 +20,15 @@ use thiserror::Error;
 
 pub use extent::{Extent, Keep};
 
-pub(crate) use fill::distance_to_middle;
+pub(crate) use fill::{FillResults, fill_chunk};
 pub(crate) use prepare::prepare_terrains;
 pub use volume::TerrainVolume;
-pub(crate) use volume::{Group, Pending, around};
+pub(crate) use volume::{ChunkState, Fill, Group, Pending, same_samples};
 
 use crate::chunk::{Chunk, ChunkGeometry};
 use crate::schedule::MarchlessSystems;
 use crate::source::Air;
+use crate::stream::{ask_for_samples, follow_viewers};
 
 /// A terrain, its settings and what it is made of.
 ///
@@ -360,10 +361,14 @@ impl Plugin for TerrainPlugin {
             .register_type::<crate::stream::StreamStats>()
             .init_resource::<crate::stream::StreamStats>()
             .register_type::<ChunkGeometry>()
-            .init_resource::<fill::FillResults>()
+            .init_resource::<FillResults>()
+            .init_resource::<crate::stats::MainThread>()
             .add_observer(prepare::forget_despawned_chunk)
             .add_observer(prepare::forget_removed_terrain)
-            .add_systems(PostUpdate, prepare_terrains.in_set(MarchlessSystems::Prepare))
-            .add_systems(PostUpdate, fill::take_filled_chunks.in_set(MarchlessSystems::Fill));
+            .add_systems(PostUpdate, (prepare_terrains, follow_viewers).chain().in_set(MarchlessSystems::Prepare))
+            .add_systems(
+                PostUpdate,
+                (fill::take_filled_chunks, ask_for_samples).chain().in_set(MarchlessSystems::Fill),
+            );
     }
 }

@@ -34,7 +34,8 @@ fn add_standard(app: &mut App) -> Handle<StandardMaterial> {
 fn chunks_follow_their_terrains_material() {
     let mut app = app_with_materials();
     let (red, blue) = (add_standard(&mut app), add_standard(&mut app));
-    let terrain = app.world_mut().spawn((ball(), MeshMaterial3d(red.clone()))).id();
+    let terrain = settled(&mut app, ball());
+    app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(red.clone()));
     app.update();
     assert_eq!(materials(&mut app), vec![red; 8]);
     app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(blue.clone()));
@@ -45,8 +46,7 @@ fn chunks_follow_their_terrains_material() {
 #[test]
 fn a_terrain_without_material_gets_a_plain_one_until_it_has_its_own() {
     let mut app = app_with_materials();
-    let terrain = app.world_mut().spawn(ball()).id();
-    app.update();
+    let terrain = settled(&mut app, ball());
     assert_eq!(materials::<StandardMaterial>(&mut app).len(), 8);
     app.world_mut().entity_mut(terrain).insert(MeshMaterial3d::<Other>::default());
     app.update();
@@ -55,10 +55,26 @@ fn a_terrain_without_material_gets_a_plain_one_until_it_has_its_own() {
 }
 
 #[test]
+fn a_chunk_has_its_material_in_the_update_that_spawns_it() {
+    let mut app = app_with_materials();
+    app.world_mut().spawn(ball());
+    for _ in 0..2_000 {
+        app.update();
+        let mut chunks = app.world_mut().query_filtered::<Has<MeshMaterial3d<StandardMaterial>>, With<Chunk>>();
+        let with_material: Vec<bool> = chunks.iter(app.world()).collect();
+        assert!(with_material.iter().all(|has_material| *has_material));
+        if with_material.len() == 8 {
+            return;
+        }
+    }
+    panic!("eight chunks have a surface");
+}
+
+#[test]
 fn another_type_of_material_is_left_alone() {
     let mut app = app_with_materials();
-    app.world_mut().spawn((ball(), MeshMaterial3d::<Other>::default()));
-    app.update();
+    let terrain = app.world_mut().spawn((ball(), MeshMaterial3d::<Other>::default())).id();
+    settle(&mut app, terrain);
     assert_eq!(materials::<Other>(&mut app).len(), 8);
     assert_eq!(materials::<StandardMaterial>(&mut app).len(), 0);
 }

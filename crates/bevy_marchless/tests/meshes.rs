@@ -33,10 +33,11 @@ fn a_spawned_terrain_gets_meshes() {
 }
 
 #[test]
-fn chunks_without_a_surface_have_no_mesh() {
+fn chunks_without_a_surface_have_no_entity() {
     let mut app = app();
     let terrain = settled(&mut app, small(Terrain::default()));
-    assert_eq!(geometry(&mut app, terrain).len(), 8);
+    assert_eq!(volume(&app, terrain).coverage(), Coverage { waiting: 0, empty: 8, drawn: 0 });
+    assert_eq!(geometry(&mut app, terrain).len(), 0);
     assert_eq!(app.world_mut().query::<&Mesh3d>().iter(app.world()).count(), 0);
     assert_eq!(mesh_assets(&app), 0);
 }

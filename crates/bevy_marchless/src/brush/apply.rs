@@ -7,7 +7,9 @@ use bevy_ecs::prelude::*;
 use marchless::Region;
 
 use super::{Stamp, TerrainEdited};
-use crate::stats::{Since, Stats};
+use crate::chunk::ChunkKey;
+use crate::stats::{MainThread, Since, Stats};
+use crate::stream::free_samples_for;
 use crate::terrain::TerrainVolume;
 
 /// Stamps that have been read but not applied, in order.
@@ -31,46 +33,83 @@ pub(crate) fn read_stamps(mut stamps: MessageReader<Stamp>, mut queue: ResMut<St
 }
 
 /// Applies the queued stamps in order; what they change together becomes one set of chunks to be meshed.
-pub(crate) fn apply_stamps(mut queue: ResMut<StampQueue>, mut volumes: Query<&mut TerrainVolume>) {
+///
+/// A stamp that needs samples that were dropped waits for them, and the terrain's stamps behind it wait with it.
+pub(crate) fn apply_stamps(
+    mut queue: ResMut<StampQueue>,
+    mut volumes: Query<&mut TerrainVolume>,
+    mut main_thread: ResMut<MainThread>,
+) {
+    if queue.0.is_empty() {
+        return;
+    }
+    let start = main_thread.start();
     let mut edited = BTreeMap::<Entity, Since>::new();
-    for Queued { terrain, stamp, since } in queue.0.drain(..) {
+    let mut waiting = BTreeMap::<Entity, bool>::new();
+    queue.0.retain(|Queued { terrain, stamp, since }| {
+        let terrain = *terrain;
         match volumes.get_mut(terrain) {
             Ok(mut volume) if volume.settings().is_some() => {
-                apply_stamp(&mut volume, stamp);
-                edited.entry(terrain).or_insert(since);
+                let waits = waiting.entry(terrain).or_default();
+                *waits = *waits || !free_samples_for(&mut volume, stamp.region());
+                if !*waits {
+                    apply_stamp(&mut volume, *stamp);
+                    edited.entry(terrain).or_insert(*since);
+                }
+                return *waits;
             }
             Ok(_) => bevy_log::warn!("a stamp is dropped: the settings of terrain {terrain} were refused"),
             Err(_) => bevy_log::warn!("a stamp is dropped: entity {terrain} has no terrain"),
+        }
+        false
+    });
+    for (terrain, waits) in waiting {
+        if let Ok(mut volume) = volumes.get_mut(terrain) {
+            volume.streaming.holds_stamps = waits;
         }
     }
     for (terrain, since) in edited {
         if let Ok(mut volume) = volumes.get_mut(terrain) {
             let dirty = volume.grid.take_dirty();
-            volume.add_pending(dirty, Some(since));
+            volume.add_changed(dirty, Some(since));
         }
     }
+    main_thread.stop(start);
 }
 
-/// Applies a stamp to the chunks that have their samples, and keeps it for the others.
+/// Applies a stamp to the chunks that have their samples, and keeps it for the others, loaded or not.
 fn apply_stamp(volume: &mut TerrainVolume, stamp: marchless::Stamp) {
     let touched = stamp.region();
     let Some(bounds) = volume.grid.bounds().filter(|_| !touched.is_empty()) else { return };
     let (low, high) = (volume.grid.chunk_of(touched.min), volume.grid.chunk_of(touched.max.map(|v| v - 1)));
     let stamp = Arc::new(stamp);
     for position in Region::new(low, high.map(|v| v + 1)).intersection(&bounds).points() {
-        match volume.chunks.get_mut(&position) {
-            Some(state) if !state.is_filled() => state.stamps.push(stamp.clone()),
-            _ => volume.edit.merge(&volume.grid.apply_to_chunk(position, &stamp)),
+        let has_samples = match volume.chunks.get(&ChunkKey::finest(position)) {
+            Some(state) => state.is_filled(),
+            None => volume.grid.chunk(position).is_some(),
+        };
+        if has_samples {
+            change(volume, position, &stamp);
+        } else {
+            volume.stamps.entry(position).or_default().push(stamp.clone());
         }
     }
 }
 
 /// Applies the stamps that came before a chunk's samples.
 pub(crate) fn apply_waiting_stamps(volume: &mut TerrainVolume, position: [i32; 3]) {
-    let Some(state) = volume.chunks.get_mut(&position) else { return };
-    for stamp in core::mem::take(&mut state.stamps) {
-        volume.edit.merge(&volume.grid.apply_to_chunk(position, &stamp));
+    for stamp in volume.stamps.remove(&position).unwrap_or_default() {
+        change(volume, position, &stamp);
     }
+}
+
+/// Applies a stamp to a chunk's samples.
+fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Stamp) {
+    let edit = volume.grid.apply_to_chunk(position, stamp);
+    if !edit.is_empty() {
+        volume.edited.insert(position);
+    }
+    volume.edit.merge(&edit);
 }
 
 /// Tells what the update has changed of each terrain.

@@ -198,7 +198,7 @@ pub(super) fn mesh_samples(
 }
 
 fn show(entity: Entity, samples: &ChunkSamples, meshed: Meshed, screen: &mut Screen) {
-    screen.stats.count_mesh(meshed.time);
+    screen.count_mesh(meshed.time);
     screen.show(entity, meshed, (samples.shape() - 1).to_array());
 }
 

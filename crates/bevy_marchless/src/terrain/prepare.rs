@@ -1,26 +1,24 @@
 //! Gives new terrains a volume and chunks, and follows changes of their settings.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{Grid, Region};
+use marchless::Grid;
 
-use super::fill::{FillResults, fill_chunk};
-use super::volume::ChunkState;
-use super::{Terrain, TerrainError, TerrainVolume};
-use crate::chunk::{Chunk, chunk_transform, new_chunk};
-use crate::work::{WorkQueue, new_number};
+use super::{Fill, Terrain, TerrainError, TerrainVolume};
+use crate::chunk::{Chunk, ChunkKey, chunk_transform};
+use crate::stats::MainThread;
+use crate::work::new_number;
 
 /// Checks terrains that are new or whose settings changed, and does what the change asks for.
 pub(crate) fn prepare_terrains(
     mut terrains: Query<(Entity, &Terrain, &mut TerrainVolume, Has<TerrainError>), Changed<Terrain>>,
     mut transforms: Query<&mut Transform, With<Chunk>>,
     mut commands: Commands,
-    queue: Res<WorkQueue>,
-    results: Res<FillResults>,
+    mut main_thread: ResMut<MainThread>,
 ) {
+    let start = main_thread.start();
     for (entity, terrain, mut volume, was_refused) in &mut terrains {
         if let Err(error) = terrain.check() {
             bevy_log::error!("terrain {entity}: {error}; its settings are not applied");
@@ -32,62 +30,59 @@ pub(crate) fn prepare_terrains(
         }
         let before = volume.settings.replace(terrain.clone());
         volume.colors = Arc::new(terrain.palette.to_vertex_colors());
-        let same_chunks = |old: &Terrain| (old.extent, old.chunk_cells) == (terrain.extent, terrain.chunk_cells);
-        if !before.as_ref().is_some_and(same_chunks) {
-            lay_out(entity, terrain, &mut volume, &mut commands);
-        }
         match &before {
             Some(old) if same_samples(old, terrain) => {
                 if !same_meshes(old, terrain) {
-                    let all: BTreeSet<_> = volume.chunks.keys().copied().collect();
-                    volume.add_pending(all, None);
+                    let all = volume.chunks.keys().map(|key| key.position).collect();
+                    volume.add_changed(all, None);
                 }
             }
-            _ => {
-                for (position, state) in &volume.chunks {
+            Some(old) if same_chunks(old, terrain) => {
+                for (key, state) in &volume.chunks {
                     if let Some(mut transform) = state.entity.and_then(|entity| transforms.get_mut(entity).ok()) {
-                        *transform = chunk_transform(*position, terrain.chunk_cells, terrain.voxel_size);
+                        *transform = chunk_transform(key.position, terrain.chunk_cells, terrain.voxel_size);
                     }
                 }
-                refill(entity, terrain, &mut volume, &queue, &results);
+                refill(terrain, &mut volume);
             }
+            _ => start_over(terrain, &mut volume, &mut commands),
         }
     }
+    main_thread.stop(start);
 }
 
-/// Replaces all chunk entities.
-fn lay_out(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, commands: &mut Commands) {
-    let extent = extent_of(terrain);
-    volume.forget_work();
-    for old in core::mem::take(&mut volume.chunks).into_values().filter_map(|state| state.entity) {
-        commands.entity(old).try_despawn();
-    }
-    for position in extent.points() {
-        let chunk = commands
-            .spawn(new_chunk(entity, crate::chunk::ChunkKey::finest(position), terrain.chunk_cells, terrain.voxel_size))
-            .id();
-        volume.chunks.insert(position, ChunkState::new(position, extent, Some(chunk)));
-    }
+/// Forgets all chunks; those in range come back by themselves.
+fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, commands: &mut Commands) {
+    let former = core::mem::take(volume);
+    despawn_chunks(&former, commands);
+    volume.settings = former.settings;
+    volume.colors = former.colors;
+    volume.grid = empty_grid(terrain);
     volume.shown = empty_grid(terrain);
     volume.shown_isovalue = terrain.isovalue;
+    volume.filling = new_number();
 }
 
 /// Asks for new samples of all chunks. What is drawn stays until each chunk's new mesh is there.
-fn refill(entity: Entity, terrain: &Terrain, volume: &mut TerrainVolume, queue: &WorkQueue, results: &FillResults) {
-    let extent = extent_of(terrain);
+fn refill(terrain: &Terrain, volume: &mut TerrainVolume) {
+    let extent = terrain.chunk_region();
     volume.forget_work();
     volume.grid = empty_grid(terrain);
+    volume.edited.clear();
+    volume.stamps.clear();
     volume.bits.clear();
     volume.filling = new_number();
     volume.unfilled = volume.chunks.len();
-    for (&position, state) in &mut volume.chunks {
-        let ticket = fill_chunk(entity, terrain, volume.filling, position, queue, results);
-        let new = ChunkState::new(position, extent, state.entity);
-        *state = ChunkState { fill: Some(ticket), drawn: state.drawn, empty: state.empty, ..new };
+    for (key, state) in &mut volume.chunks {
+        state.fill = Fill::Unasked;
+        state.missing = key.around().filter(|near| extent.contains(near.position)).count() as u8;
+        state.stale = state.drawn;
     }
+    let all: Vec<ChunkKey> = volume.chunks.keys().copied().collect();
+    volume.streaming.refill(all.into_iter());
 }
 
-/// A despawned chunk is meshed no more. Its samples stay: its neighbours' meshes need them.
+/// A despawned chunk is drawn no more. Its samples stay: its neighbours' meshes need them.
 pub(crate) fn forget_despawned_chunk(
     removed: On<Remove, Chunk>,
     chunks: Query<&Chunk>,
@@ -95,9 +90,10 @@ pub(crate) fn forget_despawned_chunk(
 ) {
     let Ok(chunk) = chunks.get(removed.entity) else { return };
     let Ok(mut volume) = volumes.get_mut(chunk.terrain) else { return };
-    if let Some(state) = volume.chunks.get_mut(&chunk.position.to_array()).filter(|s| s.entity == Some(removed.entity))
-    {
+    let key = ChunkKey { level: chunk.level, position: chunk.position.to_array() };
+    if let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.entity == Some(removed.entity)) {
         state.entity = None;
+        state.hidden = true;
     }
 }
 
@@ -109,23 +105,28 @@ pub(crate) fn forget_removed_terrain(
 ) {
     let Ok(mut volume) = volumes.get_mut(removed.entity) else { return };
     let former = core::mem::take(&mut *volume);
-    for chunk in former.chunks.into_values().filter_map(|state| state.entity) {
+    despawn_chunks(&former, &mut commands);
+}
+
+fn despawn_chunks(volume: &TerrainVolume, commands: &mut Commands) {
+    for chunk in volume.chunks.values().filter_map(|state| state.entity) {
         commands.entity(chunk).try_despawn();
     }
 }
 
+/// Whether chunks have the same places.
+fn same_chunks(a: &Terrain, b: &Terrain) -> bool {
+    a.extent == b.extent && a.chunk_cells == b.chunk_cells
+}
+
 /// Whether both are the same before any edit.
 fn same_samples(a: &Terrain, b: &Terrain) -> bool {
-    a.source == b.source && a.extent == b.extent && a.chunk_cells == b.chunk_cells && a.voxel_size == b.voxel_size
+    a.source == b.source && same_chunks(a, b) && a.voxel_size == b.voxel_size
 }
 
 /// Whether the same samples look the same.
 fn same_meshes(a: &Terrain, b: &Terrain) -> bool {
     a.isovalue == b.isovalue && a.normals == b.normals && a.palette == b.palette
-}
-
-fn extent_of(terrain: &Terrain) -> Region {
-    terrain.kept_region()
 }
 
 fn empty_grid(terrain: &Terrain) -> Grid<i16> {

@@ -5,14 +5,16 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use bevy_math::IVec3;
+use bevy_platform::collections::{HashMap, HashSet};
 use bevy_reflect::prelude::*;
 use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, Region, Stamp};
 
 use super::Terrain;
 use crate::bits::BitsCache;
+use crate::chunk::ChunkKey;
 use crate::mesh::{Colors, Meshed};
 use crate::stats::Since;
-use crate::stream::{Coverage, Leaf, LeafState};
+use crate::stream::{Coverage, Leaf, LeafState, Streaming, Wanted};
 use crate::work::{Ticket, new_number};
 
 /// A terrain's samples. The plugin fills and changes them; read them here, change them with
@@ -20,7 +22,7 @@ use crate::work::{Ticket, new_number};
 #[derive(Component, Reflect)]
 #[reflect(Component, Default, from_reflect = false)]
 pub struct TerrainVolume {
-    /// The newest samples.
+    /// The newest samples: of loaded chunks, and of all that were edited.
     #[reflect(ignore)]
     pub(crate) grid: Grid<i16>,
     /// The samples as drawn, and those that chunks not drawn yet will have beside drawn ones.
@@ -29,27 +31,39 @@ pub struct TerrainVolume {
     /// The isovalue as drawn.
     #[reflect(ignore)]
     pub(crate) shown_isovalue: f32,
-    /// Every chunk of the extent.
+    /// Every loaded chunk.
     #[reflect(ignore)]
-    pub(crate) chunks: BTreeMap<[i32; 3], ChunkState>,
+    pub(crate) chunks: HashMap<ChunkKey, ChunkState>,
     /// The settings in effect.
     #[reflect(ignore)]
     pub(crate) settings: Option<Terrain>,
     /// The colours of the settings' palette.
     #[reflect(ignore)]
     pub(crate) colors: Colors,
+    /// Which chunks are loaded, and what is being done about it.
+    #[reflect(ignore)]
+    pub(crate) streaming: Streaming,
+    /// Chunks whose samples are not their source's alone; they are never forgotten.
+    #[reflect(ignore)]
+    pub(crate) edited: HashSet<[i32; 3]>,
+    /// Stamps that came before a chunk's samples, in order.
+    #[reflect(ignore)]
+    pub(crate) stamps: HashMap<[i32; 3], Vec<Arc<Stamp>>>,
     /// What stamps have changed in this update.
     #[reflect(ignore)]
     pub(crate) edit: Edit,
     /// Which filling it is, so that a chunk sampled for an earlier one is recognised; 0 before the first.
     #[reflect(ignore)]
     pub(crate) filling: u64,
-    /// How many chunks wait for their samples.
+    /// How many loaded chunks wait for their samples.
     #[reflect(ignore)]
     pub(crate) unfilled: usize,
-    /// Chunks whose surroundings are filled, but which have not been meshed since.
+    /// Chunks whose surroundings are filled, but which have not been meshed since; some twice, some no longer.
     #[reflect(ignore)]
-    pub(crate) ready: BTreeSet<[i32; 3]>,
+    pub(crate) ready: Vec<ChunkKey>,
+    /// How many chunks are being meshed for the first time.
+    #[reflect(ignore)]
+    pub(crate) first_meshes: usize,
     /// Changed chunks that wait to be meshed. No chunk is in two sets.
     #[reflect(ignore)]
     pub(crate) pending: Vec<Pending>,
@@ -58,32 +72,49 @@ pub struct TerrainVolume {
     pub(crate) groups: BTreeMap<u64, Group>,
     /// Which group works on a chunk. No chunk is in two groups, so results can never be shown out of order.
     #[reflect(ignore)]
-    pub(crate) claims: BTreeMap<[i32; 3], u64>,
+    pub(crate) claims: HashMap<ChunkKey, u64>,
     /// Which of the newest samples are solid.
     #[reflect(ignore)]
     pub(crate) bits: BitsCache,
 }
 
-/// One chunk of a volume.
+/// One loaded chunk of a volume.
 pub(crate) struct ChunkState {
-    /// Its entity; `None` once that has been despawned.
+    /// Whether it is to be drawn, or has samples for its neighbours only.
+    pub(crate) wanted: Wanted,
+    /// Its entity, once there has been something to draw.
     pub(crate) entity: Option<Entity>,
-    /// The job that samples it, until it is filled.
-    pub(crate) fill: Option<Ticket>,
+    /// Whether the game has despawned its entity: then it is drawn no more.
+    pub(crate) hidden: bool,
+    pub(crate) fill: Fill,
     /// How many chunks of its 3 × 3 × 3 surroundings, itself included, are not filled.
     pub(crate) missing: u8,
     /// Whether it has ever been meshed; after a new filling its former mesh stays until the next.
     pub(crate) drawn: bool,
     /// Whether nothing is shown of it.
     pub(crate) empty: bool,
-    /// Stamps that came before its samples, in order.
-    pub(crate) stamps: Vec<Arc<Stamp>>,
+    /// Whether what is drawn is older than the samples because some around it were missing.
+    pub(crate) stale: bool,
+}
+
+/// How far the samples of a chunk are.
+#[derive(Debug)]
+pub(crate) enum Fill {
+    /// Nobody has asked for them yet.
+    Unasked,
+    /// They take sampling, which waits for its turn.
+    Waiting,
+    /// The job that samples.
+    Asked(#[expect(dead_code, reason = "dropping it withdraws the job")] Ticket),
+    Done,
+    /// They were there, and have been dropped.
+    Dropped,
 }
 
 /// Changed chunks that are to be meshed from one snapshot.
 #[derive(Debug)]
 pub(crate) struct Pending {
-    pub(crate) chunks: BTreeSet<[i32; 3]>,
+    pub(crate) chunks: BTreeSet<ChunkKey>,
     /// When the first of the edits was asked for; `None` where none was (a change of settings).
     pub(crate) since: Option<Since>,
 }
@@ -91,12 +122,12 @@ pub(crate) struct Pending {
 /// Chunks that are being meshed from one snapshot, to be shown in one update.
 pub(crate) struct Group {
     /// The chunks it claims: its members, and those that cannot be meshed yet.
-    pub(crate) chunks: BTreeSet<[i32; 3]>,
+    pub(crate) chunks: BTreeSet<ChunkKey>,
     /// The samples of its members and of the chunks around them.
     pub(crate) snapshot: BTreeMap<[i32; 3], Chunk<i16>>,
     pub(crate) isovalue: f32,
     pub(crate) since: Option<Since>,
-    /// Whether it may give way to an edit before its jobs have begun.
+    /// Whether it may give way to an edit before its jobs have begun: a chunk that has never been drawn.
     pub(crate) withdrawable: bool,
     pub(crate) tickets: Vec<Ticket>,
     /// How many chunks will have been meshed when it is complete.
@@ -111,23 +142,27 @@ impl Default for TerrainVolume {
             shown: grid.clone(),
             grid,
             shown_isovalue: 0.0,
-            chunks: BTreeMap::new(),
+            chunks: HashMap::default(),
             settings: None,
             colors: Arc::new([[1.0; 4]; 256]),
+            streaming: Streaming::default(),
+            edited: HashSet::default(),
+            stamps: HashMap::default(),
             edit: Edit::NONE,
             filling: 0,
             unfilled: 0,
-            ready: BTreeSet::new(),
+            ready: Vec::new(),
+            first_meshes: 0,
             pending: Vec::new(),
             groups: BTreeMap::new(),
-            claims: BTreeMap::new(),
+            claims: HashMap::default(),
             bits: BitsCache::default(),
         }
     }
 }
 
 impl TerrainVolume {
-    /// The newest samples, with every edit; perhaps not shown yet. Absent chunks are not filled yet.
+    /// The newest samples, with every edit; perhaps not shown yet. Absent chunks are not filled, not loaded, or dropped.
     pub const fn grid(&self) -> &Grid<i16> {
         &self.grid
     }
@@ -147,18 +182,20 @@ impl TerrainVolume {
         self.settings.as_ref()
     }
 
-    /// The entity of the chunk at `position`, in chunks.
+    /// The entity of the chunk at `position`, in chunks; `None` where there is nothing to draw.
     pub fn chunk_entity(&self, position: IVec3) -> Option<Entity> {
-        self.chunks.get(&position.to_array())?.entity
+        self.chunks.get(&ChunkKey::finest(position.to_array()))?.entity
     }
 
     /// What is shown of the chunk at a place, in chunks; `None` where it is in no range.
+    ///
+    /// All places in range together are the terrain's cover: each belongs to one leaf in every update.
     pub fn leaf_at(&self, position: IVec3) -> Option<Leaf> {
-        let state = self.chunks.get(&position.to_array())?;
-        let state = match (state.drawn, state.empty) {
-            (false, _) => LeafState::Waiting,
-            (true, true) => LeafState::Empty,
-            (true, false) => LeafState::Drawn,
+        let chunk = position.to_array();
+        let state = match self.chunks.get(&ChunkKey::finest(chunk)) {
+            Some(state) if state.wanted == Wanted::Mesh => state.leaf_state(),
+            _ if self.streaming.ranges().contains(chunk) => LeafState::Waiting,
+            _ => return None,
         };
         Some(Leaf { level: 0, position, state })
     }
@@ -166,24 +203,51 @@ impl TerrainVolume {
     /// How many leaves of each state there are.
     pub fn coverage(&self) -> Coverage {
         let mut coverage = Coverage::default();
-        for leaf in self.chunks.keys().filter_map(|position| self.leaf_at(IVec3::from(*position))) {
-            match leaf.state {
+        for state in self.chunks.values().filter(|state| state.wanted == Wanted::Mesh) {
+            match state.leaf_state() {
                 LeafState::Waiting => coverage.waiting += 1,
                 LeafState::Empty => coverage.empty += 1,
                 LeafState::Drawn => coverage.drawn += 1,
             }
         }
+        let is_leaf = |key: &ChunkKey| self.chunks.get(key).is_some_and(|state| state.wanted == Wanted::Mesh);
+        let on_their_way: HashSet<ChunkKey> = self.streaming.on_their_way().filter(|key| !is_leaf(key)).collect();
+        let in_range = |key: &&ChunkKey| self.streaming.ranges().contains(key.position);
+        coverage.waiting += on_their_way.iter().filter(in_range).count();
         coverage
     }
 
-    /// Whether all chunks have their samples.
-    pub const fn is_filled(&self) -> bool {
-        self.settings.is_some() && self.unfilled == 0
+    /// Whether all chunks in range have their samples.
+    pub fn is_filled(&self) -> bool {
+        self.settings.is_some() && self.unfilled == 0 && self.streaming.is_idle()
     }
 
-    /// Whether all chunks have their samples and everything is drawn as it is.
+    /// Whether all chunks in range have their samples and everything is drawn as it is.
     pub fn is_settled(&self) -> bool {
         self.is_filled() && self.ready.is_empty() && self.pending.is_empty() && self.groups.is_empty()
+    }
+
+    /// How much memory the samples take, in bytes: what is drawn, what is newest, and the plugin's notes about each chunk.
+    pub fn sample_bytes(&self) -> usize {
+        let samples = |chunk: &Chunk<i16>| match chunk {
+            Chunk::Uniform(_) => 0,
+            Chunk::Samples(samples) => 2 * samples.weights.capacity() + samples.materials.capacity(),
+        };
+        let newest: usize = self.grid.chunks().map(|(_, chunk)| samples(chunk)).sum();
+        let older = self
+            .shown
+            .chunks()
+            .filter(|(position, shown)| !self.grid.chunk(*position).is_some_and(|newest| same_samples(newest, shown)));
+        let entries = self.grid.chunks().count() + self.shown.chunks().count();
+        newest
+            + older.map(|(_, chunk)| samples(chunk)).sum::<usize>()
+            + entries * size_of::<([i32; 3], Chunk<i16>)>()
+            + self.chunks.len() * size_of::<(ChunkKey, ChunkState)>()
+    }
+
+    /// How many chunks in range, or beside it, wait for their samples or their mesh.
+    pub(crate) fn waiting(&self) -> usize {
+        self.streaming.on_their_way().count() + self.unfilled + self.waiting_for_meshes()
     }
 
     /// How many chunks can be meshed, or are being meshed.
@@ -194,7 +258,7 @@ impl TerrainVolume {
     }
 
     /// Notes that chunks have changed; sets that overlap become one.
-    pub(crate) fn add_pending(&mut self, mut chunks: BTreeSet<[i32; 3]>, mut since: Option<Since>) {
+    pub(crate) fn add_pending(&mut self, mut chunks: BTreeSet<ChunkKey>, mut since: Option<Since>) {
         if chunks.is_empty() {
             return;
         }
@@ -209,21 +273,48 @@ impl TerrainVolume {
         self.pending.push(Pending { chunks, since });
     }
 
-    /// Takes in a chunk's samples, and finds which chunks can now be meshed.
-    pub(crate) fn set_filled(&mut self, position: [i32; 3]) {
-        self.unfilled -= 1;
-        for neighbour in around(position) {
+    /// Notes that chunks of the finest level have changed: those of them that are drawn, or will be.
+    pub(crate) fn add_changed(&mut self, changed: BTreeSet<[i32; 3]>, since: Option<Since>) {
+        let keys = changed.into_iter().map(ChunkKey::finest);
+        let is_leaf = |key: &ChunkKey| self.chunks.get(key).is_some_and(|state| state.wanted == Wanted::Mesh);
+        let chunks = keys.filter(is_leaf).collect();
+        self.add_pending(chunks, since);
+    }
+
+    /// Notes that a chunk has its samples, and finds which chunks can now be meshed.
+    pub(crate) fn set_filled(&mut self, key: ChunkKey) {
+        let Some(state) = self.chunks.get_mut(&key) else { return };
+        if matches!(core::mem::replace(&mut state.fill, Fill::Done), Fill::Unasked | Fill::Waiting | Fill::Asked(_)) {
+            self.unfilled -= 1;
+        }
+        for neighbour in key.around() {
             if let Some(state) = self.chunks.get_mut(&neighbour) {
                 state.missing -= 1;
-                if state.missing == 0 {
-                    self.ready.insert(neighbour);
+                if state.missing == 0 && state.wanted == Wanted::Mesh && (!state.drawn || state.stale) {
+                    self.ready.push(neighbour);
                 }
             }
         }
     }
 
+    /// Notes that a chunk no longer has its samples.
+    pub(crate) fn set_unfilled(&mut self, key: ChunkKey) {
+        for neighbour in key.around() {
+            if let Some(state) = self.chunks.get_mut(&neighbour) {
+                state.missing += 1;
+            }
+        }
+    }
+
+    /// How many chunks around a place, itself included, have to be filled and are not.
+    pub(crate) fn missing_around(&self, key: ChunkKey, extent: Region) -> u8 {
+        let is_missing =
+            |key: &ChunkKey| extent.contains(key.position) && !self.chunks.get(key).is_some_and(ChunkState::is_filled);
+        key.around().filter(is_missing).count() as u8
+    }
+
     /// Whether no group works on `chunks`. Groups that may give way to an edit do so where none of their jobs has begun.
-    pub(crate) fn free_for_edit(&mut self, chunks: &BTreeSet<[i32; 3]>) -> bool {
+    pub(crate) fn free_for_edit(&mut self, chunks: &BTreeSet<ChunkKey>) -> bool {
         let claimed: BTreeSet<u64> = chunks.iter().filter_map(|position| self.claims.get(position)).copied().collect();
         let mut free = true;
         for id in claimed {
@@ -238,7 +329,7 @@ impl TerrainVolume {
     }
 
     /// Claims chunks for a new group, and gives it a number.
-    pub(crate) fn claim(&mut self, chunks: &BTreeSet<[i32; 3]>) -> u64 {
+    pub(crate) fn claim(&mut self, chunks: &BTreeSet<ChunkKey>) -> u64 {
         let number = new_number();
         self.claims.extend(chunks.iter().map(|position| (*position, number)));
         number
@@ -247,9 +338,10 @@ impl TerrainVolume {
     /// Takes out a group, and frees the chunks that it claims.
     pub(crate) fn take_group(&mut self, id: u64) -> Option<Group> {
         let group = self.groups.remove(&id)?;
-        for position in &group.chunks {
-            self.claims.remove(position);
+        for key in &group.chunks {
+            self.claims.remove(key);
         }
+        self.first_meshes -= usize::from(group.withdrawable);
         Some(group)
     }
 
@@ -259,25 +351,46 @@ impl TerrainVolume {
         self.pending.clear();
         self.groups.clear();
         self.claims.clear();
+        self.first_meshes = 0;
     }
 }
 
 impl ChunkState {
-    /// A chunk in `extent` (in chunks) that is to be sampled.
-    pub(crate) fn new(position: [i32; 3], extent: Region, entity: Option<Entity>) -> Self {
-        let missing = around(position).filter(|neighbour| extent.contains(*neighbour)).count() as u8;
-        Self { entity, fill: None, missing, drawn: false, empty: true, stamps: Vec::new() }
+    /// A chunk that is to be sampled.
+    pub(crate) const fn new(wanted: Wanted, missing: u8) -> Self {
+        Self {
+            wanted,
+            entity: None,
+            hidden: false,
+            fill: Fill::Unasked,
+            missing,
+            drawn: false,
+            empty: true,
+            stale: false,
+        }
     }
 
     /// Whether its samples are there.
     pub(crate) const fn is_filled(&self) -> bool {
-        self.fill.is_none()
+        matches!(self.fill, Fill::Done)
+    }
+
+    const fn leaf_state(&self) -> LeafState {
+        match (self.drawn, self.empty) {
+            (false, _) => LeafState::Waiting,
+            (true, true) => LeafState::Empty,
+            (true, false) => LeafState::Drawn,
+        }
     }
 }
 
-/// The 3 × 3 × 3 chunks around `position`, itself included.
-pub(crate) fn around(position: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
-    Region::new(position.map(|v| v - 1), position.map(|v| v + 2)).points()
+/// Whether two chunks are known to be the same without looking at their samples.
+pub(crate) fn same_samples(a: &Chunk<i16>, b: &Chunk<i16>) -> bool {
+    match (a, b) {
+        (Chunk::Uniform(a), Chunk::Uniform(b)) => a == b,
+        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
+        _ => false,
+    }
 }
 
 #[cfg(test)]
@@ -288,7 +401,7 @@ mod tests {
     /// A volume with one group of one job for the first chunk.
     fn volume_with_group(withdrawable: bool, queue: &WorkQueue) -> TerrainVolume {
         let mut volume = TerrainVolume::default();
-        let chunks = BTreeSet::from([[0, 0, 0]]);
+        let chunks = BTreeSet::from([ChunkKey::finest([0, 0, 0])]);
         let id = volume.claim(&chunks);
         let group = Group {
             chunks,
@@ -300,14 +413,15 @@ mod tests {
             members: 1,
             meshed: Vec::new(),
         };
+        volume.first_meshes += usize::from(withdrawable);
         volume.groups.insert(id, group);
         volume
     }
 
     #[test]
     fn an_edit_waits_for_groups_unless_they_can_give_way() {
-        let edited = BTreeSet::from([[0, 0, 0], [1, 0, 0]]);
-        let elsewhere = BTreeSet::from([[1, 0, 0]]);
+        let edited = BTreeSet::from([[0, 0, 0], [1, 0, 0]].map(ChunkKey::finest));
+        let elsewhere = BTreeSet::from([ChunkKey::finest([1, 0, 0])]);
         let queue = WorkQueue::default();
         let mut volume = volume_with_group(false, &queue);
         assert!(volume.free_for_edit(&elsewhere));
@@ -327,7 +441,7 @@ mod tests {
     #[test]
     fn sets_that_overlap_become_one() {
         let mut volume = TerrainVolume::default();
-        let set = |xs: &[i32]| xs.iter().map(|&x| [x, 0, 0]).collect::<BTreeSet<_>>();
+        let set = |xs: &[i32]| xs.iter().map(|&x| ChunkKey::finest([x, 0, 0])).collect::<BTreeSet<_>>();
         volume.add_pending(set(&[0, 1]), None);
         volume.add_pending(set(&[4, 5]), None);
         assert_eq!(volume.pending.len(), 2);

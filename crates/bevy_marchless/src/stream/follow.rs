@@ -1,0 +1,546 @@
+//! [`Streaming`]: what becomes of chunks when ranges change.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use bevy_math::DAffine3;
+use bevy_platform::collections::{HashMap, HashSet};
+use bevy_platform::time::Instant;
+use bevy_tasks::AsyncComputeTaskPool;
+use bevy_transform::components::GlobalTransform;
+use bevy_transform::helper::TransformHelper;
+use marchless::{Chunk, Region, Source};
+
+use super::range::{Range, Ranges, Viewed, Wanted};
+use super::{StreamStats, TerrainViewer};
+use crate::brush::apply_waiting_stamps;
+use crate::chunk::ChunkKey;
+use crate::place::{Place, in_double_precision};
+use crate::schedule::MarchlessSettings;
+use crate::stats::MainThread;
+use crate::terrain::{ChunkState, Fill, FillResults, Terrain, TerrainVolume, fill_chunk};
+use crate::work::{Ticket, WorkQueue};
+
+/// Viewers' positions are rounded to this part of a chunk, so that small steps change nothing.
+const STEP: f64 = 1.0 / 8.0;
+/// No viewer sees farther, in voxels.
+const FARTHEST: f64 = 1e9;
+/// Chunks per axis of the boxes that the source bounds at once.
+const BOX: i32 = 4;
+/// Bounds of so many boxes are remembered.
+const MOST_BOXES: usize = 4096;
+/// Each update at least so many chunks are gone through.
+const LEAST: usize = 16;
+/// So many stamps may wait for a chunk that is not loaded, before it is filled for their sake.
+const MOST_STAMPS: usize = 64;
+
+/// Which chunks of a terrain are loaded, and what is to be done about it.
+#[derive(Default)]
+pub(crate) struct Streaming {
+    ranges: Ranges,
+    /// The latest good range of each viewer.
+    viewers: HashMap<Entity, Viewed>,
+    /// Chunks that ranges may ask for; the most urgent last. Some several times, some no longer.
+    arriving: Vec<ChunkKey>,
+    /// Chunks that ranges may no longer ask for.
+    leaving: Vec<ChunkKey>,
+    /// Chunks that wait to be sampled; some no longer.
+    to_fill: Vec<ChunkKey>,
+    to_fill_is_sorted: bool,
+    /// How many jobs are sampling, or about to.
+    asked: usize,
+    /// What the source is certain of, box by box.
+    boxes: HashMap<[i32; 3], Option<Chunk<i16>>>,
+    /// Chunks that are not loaded, but are being filled for the stamps that wait for them.
+    remote: HashMap<[i32; 3], Ticket>,
+    /// Whether samples may be dropped, and whether there may be some that could be.
+    drops: bool,
+    pub(crate) may_drop_more: bool,
+    /// Whether a stamp waits for samples that had been dropped.
+    pub(crate) holds_stamps: bool,
+}
+
+impl Streaming {
+    pub(crate) const fn ranges(&self) -> &Ranges {
+        &self.ranges
+    }
+
+    /// Chunks whose lot is still to be decided.
+    pub(crate) fn on_their_way(&self) -> impl Iterator<Item = ChunkKey> + '_ {
+        self.arriving.iter().copied()
+    }
+
+    /// Whether nothing is left to load, to unload or to fill.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.arriving.is_empty() && self.leaving.is_empty() && self.remote.is_empty() && !self.holds_stamps
+    }
+
+    /// Notes that a chunk is to be looked at again.
+    pub(crate) fn look_at(&mut self, key: ChunkKey) {
+        self.arriving.push(key);
+    }
+
+    /// Forgets what is being filled: all loaded chunks are to be filled anew.
+    pub(crate) fn refill(&mut self, all: impl Iterator<Item = ChunkKey>) {
+        self.to_fill.clear();
+        self.boxes.clear();
+        self.remote.clear();
+        self.asked = 0;
+        self.arriving.extend(all);
+        self.sort();
+    }
+
+    /// Whether a job for a chunk that is not loaded has been asked for; it is done now.
+    pub(crate) fn take_remote(&mut self, position: [i32; 3]) -> bool {
+        let found = self.remote.remove(&position).is_some();
+        self.asked -= usize::from(found);
+        found
+    }
+
+    /// Notes that a job that samples is done or no longer wanted.
+    pub(crate) fn job_is_over(&mut self) {
+        self.asked -= 1;
+    }
+
+    fn sort(&mut self) {
+        let ranges = &self.ranges;
+        self.arriving.sort_by_cached_key(|key| core::cmp::Reverse(ranges.urgency(key.position)));
+        self.to_fill_is_sorted = false;
+    }
+
+    /// Takes new ranges, and notes which chunks they concern.
+    fn change(&mut self, new: Ranges) {
+        let old = core::mem::replace(&mut self.ranges, new);
+        self.drops = self.ranges.0.iter().any(|viewed| viewed.samples.is_some());
+        let (arriving, leaving, ranges) = (&mut self.arriving, &mut self.leaving, &self.ranges);
+        ranges.differences(&old, |position| {
+            let is_wanted = ranges.wanted(position, Wanted::Gone) > Wanted::Gone;
+            if is_wanted { &mut *arriving } else { &mut *leaving }.push(ChunkKey::finest(position));
+        });
+        self.sort();
+    }
+
+    /// What the source is certain of without sampling. A source that panics is certain of nothing.
+    fn bound(&mut self, source: &dyn Source, position: [i32; 3], cells: u32, spacing: f64) -> Option<Chunk<i16>> {
+        if self.boxes.len() > MOST_BOXES {
+            self.boxes.clear();
+        }
+        let corner = position.map(|v| v.div_euclid(BOX));
+        let of_box = || Chunk::box_without_sampling(source, corner.map(|v| v * BOX), BOX as u32, cells, spacing);
+        let whole = self.boxes.entry(corner).or_insert_with(|| catch_unwind(AssertUnwindSafe(of_box)).ok().flatten());
+        if whole.is_some() {
+            return whole.clone();
+        }
+        let of_chunk = || Chunk::without_sampling(source, position, cells, spacing);
+        catch_unwind(AssertUnwindSafe(of_chunk)).ok().flatten()
+    }
+}
+
+/// Moves the ranges of all terrains with their viewers, and lets chunks follow as far as the update's time allows.
+pub(crate) fn follow_viewers(
+    mut terrains: Query<(Entity, &mut TerrainVolume, Place)>,
+    viewers: Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>,
+    transforms: TransformHelper,
+    settings: Res<MarchlessSettings>,
+    mut stats: ResMut<StreamStats>,
+    mut main_thread: ResMut<MainThread>,
+    mut commands: Commands,
+    mut reported: Local<HashSet<Entity>>,
+) {
+    let start = main_thread.start();
+    let mut viewers: Vec<_> = viewers.iter().collect();
+    viewers.sort_by_key(|(viewer, ..)| *viewer);
+    reported.retain(|entity| viewers.iter().any(|(viewer, ..)| viewer == entity) || terrains.contains(*entity));
+    for (terrain, mut volume, place) in &mut terrains {
+        let Some(settings_in_effect) = &volume.settings else { continue };
+        // Where things are in this very update; in a floating space, where they were when transforms were last propagated.
+        let now = |entity: Entity| transforms.compute_global_transform(entity).ok();
+        let to_world = if place.is_floating() {
+            Some(place.to_world())
+        } else {
+            now(terrain).map(|transform| in_double_precision(&transform))
+        };
+        let mut look =
+            Look { terrain: settings_in_effect, to_terrain: to_world.map(|it| it.inverse()), reported: &mut reported };
+        let mut found = HashMap::default();
+        for (viewer, settings, propagated) in &viewers {
+            let at = if place.is_floating() { (!propagated.is_added()).then_some(**propagated) } else { now(*viewer) };
+            let seen = at.and_then(|at| look.at(terrain, *viewer, settings, &at));
+            if let Some(viewed) = seen.or_else(|| volume.streaming.viewers.get(viewer).copied()) {
+                found.insert(*viewer, viewed);
+            }
+        }
+        let (extent, kept) = (settings_in_effect.chunk_region(), settings_in_effect.kept_region());
+        let mut ranges = Ranges::default();
+        if !kept.is_empty() {
+            let range = Range::of_box(kept, extent);
+            ranges.0.push(Viewed { range, margin: 0.0, samples: None, forward: [0.0; 3] });
+        }
+        ranges.0.extend(viewers.iter().filter_map(|(viewer, ..)| found.get(viewer)));
+        if ranges != volume.streaming.ranges {
+            volume.streaming.viewers = found;
+            volume.streaming.change(ranges);
+        }
+        if volume.streaming.drops && volume.streaming.may_drop_more && volume.is_settled() {
+            volume.streaming.may_drop_more = false;
+            let all: Vec<ChunkKey> = volume.chunks.keys().copied().collect();
+            volume.streaming.leaving.extend(all);
+        }
+        if !volume.streaming.arriving.is_empty() || !volume.streaming.leaving.is_empty() {
+            let until = main_thread.until(start, settings.main_thread / 2);
+            let mut follow = Follow { volume: &mut volume, commands: &mut commands, stats: &mut stats };
+            follow.go_on(until);
+        }
+    }
+    main_thread.stop(start);
+}
+
+/// Finding the ranges around one terrain's viewers.
+struct Look<'a> {
+    terrain: &'a Terrain,
+    /// From world space to the terrain's own.
+    to_terrain: Option<DAffine3>,
+    /// What has been warned of.
+    reported: &'a mut HashSet<Entity>,
+}
+
+impl Look<'_> {
+    /// What a viewer sees; `None` where that cannot be said.
+    fn at(
+        &mut self,
+        terrain: Entity,
+        viewer: Entity,
+        settings: &TerrainViewer,
+        place: &GlobalTransform,
+    ) -> Option<Viewed> {
+        let Some(to_terrain) = self.to_terrain.filter(|to_terrain| to_terrain.is_finite()) else {
+            self.warn(terrain, || format!("terrain {terrain} cannot be followed: its transform has no inverse"));
+            return None;
+        };
+        let cells = f64::from(self.terrain.chunk_cells);
+        let position = place.translation();
+        let at = to_terrain.transform_point3(position.as_dvec3()) / (f64::from(self.terrain.voxel_size) * cells);
+        let at = at.to_array();
+        let radii = settings.radii.as_dvec3().to_array().map(|v| v.min(FARTHEST) / cells);
+        let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
+        if !at.iter().all(|v| v.is_finite()) {
+            self.warn(viewer, || {
+                format!("terrain viewer {viewer} has no finite position ({position}); it loads nothing new")
+            });
+            return None;
+        }
+        // Not a number is not above 0 either.
+        if !(radii.iter().all(|radius| *radius > 0.0) && margin >= 0.0 && samples >= 0.0) {
+            let TerrainViewer { radii, margin, sample_radius } = settings;
+            self.warn(viewer, || {
+                format!(
+                    "terrain viewer {viewer} needs radii above 0 and a margin and a sample radius of 0 or more, in voxels, \
+                     but has {radii}, {margin} and {sample_radius}; it loads nothing new"
+                )
+            });
+            return None;
+        }
+        let middle = at.map(|v| (v / STEP).round() * STEP);
+        let extent = self.terrain.chunk_region();
+        let whole = Range::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
+        let range = limited(whole);
+        if range == whole {
+            self.reported.remove(&viewer);
+        } else {
+            self.warn(viewer, || {
+                format!(
+                    "terrain viewer {viewer} asks for more than {} chunks with radii of {} voxels; they are scaled down",
+                    Terrain::MAX_CHUNKS,
+                    settings.radii
+                )
+            });
+        }
+        let samples = samples.is_finite().then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
+        // In steps, so that looking around changes little.
+        let forward = to_terrain.transform_vector3(place.forward().as_dvec3()).normalize_or_zero();
+        let forward = (forward * 2.0).round().to_array();
+        Some(Viewed { range, margin: margin.min(1e6), samples, forward })
+    }
+
+    fn warn(&mut self, about: Entity, text: impl FnOnce() -> String) {
+        if self.reported.insert(about) {
+            bevy_log::warn!("{}", text());
+        }
+    }
+}
+
+/// The range, made smaller until it has no more chunks than may be loaded.
+fn limited(mut range: Range) -> Range {
+    // First by the box around it: rows of a huge range would take too long to count.
+    while range.box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
+        range = range.shrunk(0.9);
+    }
+    while range.box_size() > Terrain::MAX_CHUNKS as f64 && range.grown(0.0).len() > Terrain::MAX_CHUNKS {
+        range = range.shrunk(0.97);
+    }
+    range
+}
+
+/// Letting the chunks of one terrain follow.
+struct Follow<'a, 'w, 's> {
+    volume: &'a mut TerrainVolume,
+    commands: &'a mut Commands<'w, 's>,
+    stats: &'a mut StreamStats,
+}
+
+impl Follow<'_, '_, '_> {
+    /// Goes through chunks, those that are wanted first, until it is late.
+    fn go_on(&mut self, until: Instant) {
+        let Some(terrain) = &self.volume.settings else { return };
+        let asked = Asked {
+            source: terrain.source.get().clone(),
+            extent: terrain.chunk_region(),
+            cells: terrain.chunk_cells,
+            spacing: f64::from(terrain.voxel_size),
+        };
+        let mut done = 0;
+        while let Some(key) = self.volume.streaming.arriving.pop() {
+            self.settle(key, &asked);
+            done += 1;
+            if done >= LEAST && done % 8 == 0 && Instant::now() >= until {
+                break;
+            }
+        }
+        let mut done = 0;
+        while let Some(key) = self.volume.streaming.leaving.pop() {
+            self.settle(key, &asked);
+            done += 1;
+            if done >= LEAST && done % 8 == 0 && Instant::now() >= until {
+                break;
+            }
+        }
+    }
+
+    /// Makes of a chunk what the ranges ask of it.
+    fn settle(&mut self, key: ChunkKey, asked: &Asked) {
+        let now = self.volume.chunks.get(&key).map_or(Wanted::Gone, |state| state.wanted);
+        let wanted = self.volume.streaming.ranges.wanted(key.position, now);
+        match (now, wanted) {
+            (Wanted::Gone, Wanted::Gone) => return,
+            (Wanted::Gone, _) => {
+                let missing = self.volume.missing_around(key, asked.extent);
+                self.volume.chunks.insert(key, ChunkState::new(wanted, missing));
+                self.volume.unfilled += 1;
+                self.stats.loaded += 1;
+            }
+            (_, Wanted::Gone) => return self.unload(key),
+            (Wanted::Samples, Wanted::Mesh) => {
+                let Some(state) = self.volume.chunks.get_mut(&key) else { return };
+                state.wanted = Wanted::Mesh;
+                if state.missing == 0 {
+                    self.volume.ready.push(key);
+                }
+            }
+            (Wanted::Mesh, Wanted::Samples) => self.hide(key),
+            (Wanted::Samples, Wanted::Samples) | (Wanted::Mesh, Wanted::Mesh) => {}
+        }
+        if self.volume.streaming.drops {
+            self.drop_or_revive(key);
+        }
+        if self.volume.chunks.get(&key).is_some_and(|state| matches!(state.fill, Fill::Unasked)) {
+            self.fill(key, asked);
+        }
+    }
+
+    /// Fills a chunk at once where that needs no job.
+    fn fill(&mut self, key: ChunkKey, Asked { source, cells, spacing, .. }: &Asked) {
+        let volume = &mut *self.volume;
+        if volume.grid.chunk(key.position).is_some() {
+            volume.take_samples(key, None);
+        } else if let Some(chunk) = volume.streaming.bound(source.as_ref(), key.position, *cells, *spacing) {
+            self.stats.bounded += 1;
+            volume.take_samples(key, Some(chunk));
+        } else if let Some(state) = volume.chunks.get_mut(&key) {
+            state.fill = Fill::Waiting;
+            volume.streaming.to_fill.push(key);
+            volume.streaming.to_fill_is_sorted = false;
+        }
+    }
+
+    /// Forgets a chunk, but for its edits.
+    fn unload(&mut self, key: ChunkKey) {
+        self.hide(key);
+        let Some(state) = self.volume.chunks.remove(&key) else { return };
+        self.stats.unloaded += 1;
+        match state.fill {
+            Fill::Unasked | Fill::Waiting => self.volume.unfilled -= 1,
+            Fill::Asked(_) => {
+                self.volume.unfilled -= 1;
+                self.volume.streaming.job_is_over();
+            }
+            Fill::Done => {
+                self.volume.set_unfilled(key);
+                if !self.volume.edited.contains(&key.position) {
+                    self.volume.grid.unload(key.position);
+                }
+            }
+            Fill::Dropped => {}
+        }
+        self.volume.shown.unload(key.position);
+    }
+
+    /// Takes a chunk from the screen.
+    fn hide(&mut self, key: ChunkKey) {
+        let first_mesh = self.volume.claims.get(&key).copied();
+        if let Some(id) = first_mesh.filter(|id| self.volume.groups.get(id).is_some_and(|group| group.withdrawable)) {
+            self.volume.take_group(id);
+        }
+        let Some(state) = self.volume.chunks.get_mut(&key) else { return };
+        state.wanted = Wanted::Samples;
+        (state.drawn, state.empty, state.stale, state.hidden) = (false, true, false, false);
+        if let Some(entity) = state.entity.take() {
+            self.commands.entity(entity).try_despawn();
+        }
+    }
+
+    /// Drops the samples of a chunk that nobody needs for now, or wants them again.
+    fn drop_or_revive(&mut self, key: ChunkKey) {
+        let volume = &mut *self.volume;
+        let Some(state) = volume.chunks.get(&key) else { return };
+        if matches!(state.fill, Fill::Dropped) {
+            if volume.streaming.ranges.wants_samples(key.position) {
+                volume.revive(key);
+            }
+        } else if state.missing > 0 && state.wanted == Wanted::Mesh && (!state.drawn || state.stale) {
+            volume.revive_around(key);
+        } else if volume.may_drop(key) && volume.streaming.ranges.may_drop_samples(key.position) {
+            volume.grid.unload(key.position);
+            volume.shown.unload(key.position);
+            if let Some(state) = volume.chunks.get_mut(&key) {
+                state.fill = Fill::Dropped;
+            }
+            volume.set_unfilled(key);
+        }
+    }
+}
+
+/// What filling a terrain's chunks takes.
+struct Asked {
+    source: Arc<dyn Source>,
+    extent: Region,
+    cells: u32,
+    spacing: f64,
+}
+
+impl TerrainVolume {
+    /// Takes in a chunk's samples, `None` where the grid has them already, and the stamps that came before them.
+    pub(crate) fn take_samples(&mut self, key: ChunkKey, chunk: Option<Chunk<i16>>) {
+        if let Some(chunk) = chunk {
+            self.grid.load(key.position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
+        }
+        apply_waiting_stamps(self, key.position);
+        self.set_filled(key);
+        // Nothing that reads these samples has been drawn: chunks are meshed once all around them are filled.
+        self.grid.take_dirty();
+    }
+
+    /// Whether samples could be filled again, and nothing reads them for now.
+    fn may_drop(&self, key: ChunkKey) -> bool {
+        let is_done = |state: &ChunkState| state.wanted == Wanted::Mesh && state.drawn && !state.stale;
+        self.chunks.get(&key).is_some_and(|state| state.is_filled())
+            && matches!(self.grid.chunk(key.position), Some(Chunk::Samples(_)))
+            && !self.edited.contains(&key.position)
+            && key.around().all(|near| self.chunks.get(&near).is_some_and(is_done) && !self.claims.contains_key(&near))
+            && !self.pending.iter().any(|pending| pending.chunks.contains(&key))
+    }
+
+    /// Asks for the dropped samples of a chunk.
+    fn revive(&mut self, key: ChunkKey) {
+        if let Some(state) = self.chunks.get_mut(&key)
+            && matches!(state.fill, Fill::Dropped)
+        {
+            state.fill = Fill::Unasked;
+            self.unfilled += 1;
+            self.streaming.arriving.push(key);
+        }
+    }
+
+    /// Asks for all dropped samples around a chunk.
+    fn revive_around(&mut self, key: ChunkKey) {
+        for near in key.around() {
+            self.revive(near);
+        }
+    }
+}
+
+/// Whether all samples that a change of `changed` (lattice points) needs are there, or may come as they are filled. Those that
+/// have been dropped are asked for.
+pub(crate) fn free_samples_for(volume: &mut TerrainVolume, changed: Region) -> bool {
+    if !volume.streaming.drops || changed.is_empty() {
+        return true;
+    }
+    let affected = volume.grid.chunks_affected_by(changed).grown(1, 1);
+    let lost = |volume: &TerrainVolume, key: &ChunkKey| {
+        // What is being filled again still has its neighbours on the screen.
+        volume.chunks.get(key).is_some_and(|state| state.drawn && !state.is_filled())
+    };
+    let all = affected.size().into_iter().map(u64::from).product::<u64>();
+    let lost: Vec<ChunkKey> = if all < volume.chunks.len() as u64 {
+        affected.points().map(ChunkKey::finest).filter(|key| lost(volume, key)).collect()
+    } else {
+        volume.chunks.keys().copied().filter(|key| affected.contains(key.position) && lost(volume, key)).collect()
+    };
+    for key in &lost {
+        volume.revive(*key);
+    }
+    lost.is_empty()
+}
+
+/// Asks for the samples of the chunks that wait for them, the most urgent first, as many as may be in flight.
+pub(crate) fn ask_for_samples(
+    mut terrains: Query<(Entity, &mut TerrainVolume)>,
+    queue: Res<WorkQueue>,
+    results: Res<FillResults>,
+    settings: Res<MarchlessSettings>,
+    mut main_thread: ResMut<MainThread>,
+) {
+    let start = main_thread.start();
+    let limit = in_flight(&settings);
+    for (entity, mut volume) in &mut terrains {
+        if volume.streaming.to_fill.is_empty() && volume.stamps.is_empty() {
+            continue;
+        }
+        let volume = &mut *volume;
+        let Some(terrain) = &volume.settings else { continue };
+        let streaming = &mut volume.streaming;
+        if !streaming.to_fill_is_sorted {
+            let ranges = &streaming.ranges;
+            streaming.to_fill.sort_by_cached_key(|key| core::cmp::Reverse(ranges.urgency(key.position)));
+            streaming.to_fill_is_sorted = true;
+        }
+        while streaming.asked < limit
+            && let Some(key) = streaming.to_fill.pop()
+        {
+            let Some(state) = volume.chunks.get_mut(&key).filter(|state| matches!(state.fill, Fill::Waiting)) else {
+                continue;
+            };
+            let urgency = streaming.ranges.urgency(key.position);
+            let ticket = fill_chunk(entity, terrain, volume.filling, key.position, urgency, &queue, &results);
+            state.fill = Fill::Asked(ticket);
+            streaming.asked += 1;
+        }
+        let crowded =
+            volume.stamps.iter().filter(|(_, stamps)| stamps.len() > MOST_STAMPS).map(|(position, _)| *position);
+        let crowded: Vec<_> = crowded.take(limit).collect();
+        for position in crowded {
+            if !volume.chunks.contains_key(&ChunkKey::finest(position)) && !streaming.remote.contains_key(&position) {
+                let ticket = fill_chunk(entity, terrain, volume.filling, position, u32::MAX, &queue, &results);
+                streaming.remote.insert(position, ticket);
+                streaming.asked += 1;
+            }
+        }
+    }
+    main_thread.stop(start);
+}
+
+/// How many chunks may be sampled, and how many meshed for the first time, at once.
+pub(crate) fn in_flight(settings: &MarchlessSettings) -> usize {
+    let threads = AsyncComputeTaskPool::try_get().map_or(1, |pool| pool.thread_num().max(1));
+    settings.chunks_in_flight.max(1).saturating_mul(if settings.budget.is_some() { 1 } else { threads })
+}

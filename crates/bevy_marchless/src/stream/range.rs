@@ -1,0 +1,341 @@
+//! [`Range`]: the chunks within a distance, row by row.
+
+use core::ops;
+
+use marchless::Region;
+
+/// Chunks: a box, or those that an ellipsoid reaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Range {
+    /// The middle, in chunks from the lattice's origin. For a box, half way between its corners.
+    middle: [f64; 3],
+    /// Half of its axes, in chunks.
+    radii: [f64; 3],
+    /// Whether it is a box instead of an ellipsoid.
+    is_box: bool,
+    /// What there is at all.
+    extent: Region,
+}
+
+impl Range {
+    /// The chunks of `extent` of which some point lies in the ellipsoid.
+    pub(crate) fn ellipsoid(middle: [f64; 3], radii: [f64; 3], extent: Region) -> Self {
+        Self { middle, radii, is_box: false, extent }
+    }
+
+    /// The chunks of `chunks` that lie in `extent`.
+    pub(crate) fn of_box(chunks: Region, extent: Region) -> Self {
+        let ends = |axis: usize| [f64::from(chunks.min[axis]), f64::from(chunks.max[axis])];
+        let middle = [0, 1, 2].map(|axis| (ends(axis)[0] + ends(axis)[1]) / 2.0);
+        // A little less than half, so that the chunks that only touch it are not in it.
+        let radii = [0, 1, 2].map(|axis| (ends(axis)[1] - ends(axis)[0]) / 2.0 - 0.25);
+        Self { middle, radii, is_box: true, extent: if chunks.is_empty() { chunks } else { extent } }
+    }
+
+    /// The range with every chunk at most `chunks` away from one of its own, per axis.
+    ///
+    /// That is exact for the ellipsoid, too: of a chunk's neighbours, the one that is nearest along each axis is a neighbour.
+    #[must_use]
+    pub(crate) fn grown(self, chunks: f64) -> Grown {
+        Grown { range: self, by: chunks }
+    }
+
+    /// The same range, wider by so many chunks.
+    #[must_use]
+    pub(crate) fn widened(self, chunks: f64) -> Self {
+        if self.is_box { self } else { Self { radii: self.radii.map(|radius| radius + chunks), ..self } }
+    }
+
+    /// How many chunks the box around it has, or a little more.
+    pub(crate) fn box_size(&self) -> f64 {
+        let size = self.extent.size();
+        (0..3).map(|axis| (2.0 * self.radii[axis] + 2.0).min(f64::from(size[axis]))).product()
+    }
+
+    /// The same range, with its axes so many times as long.
+    #[must_use]
+    pub(crate) fn shrunk(self, factor: f64) -> Self {
+        Self { radii: self.radii.map(|radius| radius * factor), ..self }
+    }
+
+    /// The square of how far a chunk is from the middle, in chunks, where half the ellipsoid's axes are equal; with other
+    /// axes, scaled to the longest.
+    pub(crate) fn squared_distance(&self, position: [i32; 3]) -> f64 {
+        let longest = self.radii.into_iter().fold(0.0, f64::max);
+        (0..3)
+            .map(|axis| {
+                let offset = f64::from(position[axis]) + 0.5 - self.middle[axis];
+                (offset * (longest / self.radii[axis].max(1e-9))).powi(2)
+            })
+            .sum()
+    }
+
+    /// From the middle to a chunk's middle, in chunks.
+    pub(crate) fn offset(&self, position: [i32; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| f64::from(position[axis]) + 0.5 - self.middle[axis])
+    }
+}
+
+/// A [`Range`] grown by some chunks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Grown {
+    range: Range,
+    by: f64,
+}
+
+impl Grown {
+    pub(crate) fn contains(&self, position: [i32; 3]) -> bool {
+        let [x, y, z] = position;
+        self.range.extent.contains(position) && self.row(y, z).contains(&x)
+    }
+
+    /// All chunks, row by row: y, z, and which x.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
+        let [y, z] = [1, 2].map(|axis| self.reach(axis, self.range.radii[axis]));
+        z.flat_map(move |z| y.clone().map(move |y| (y, z, self.row(y, z)))).filter(|(.., row)| !row.is_empty())
+    }
+
+    /// How many chunks there are.
+    pub(crate) fn len(&self) -> u64 {
+        self.rows().map(|(.., row)| row.len() as u64).sum()
+    }
+
+    /// Which chunks of a row belong to it.
+    fn row(&self, y: i32, z: i32) -> ops::Range<i32> {
+        let Range { middle, radii, is_box, extent } = &self.range;
+        let beyond = |axis: usize, position: i32| {
+            let low = f64::from(position) - self.by;
+            let nearest = middle[axis].clamp(low, low + 1.0 + 2.0 * self.by);
+            (nearest - middle[axis]) / radii[axis]
+        };
+        let (y_beyond, z_beyond) = (beyond(1, y), beyond(2, z));
+        let left = if *is_box {
+            if y_beyond.abs() <= 1.0 && z_beyond.abs() <= 1.0 { 1.0 } else { -1.0 }
+        } else {
+            1.0 - y_beyond * y_beyond - z_beyond * z_beyond
+        };
+        let is_there = |axis: usize, position: i32| (extent.min[axis]..extent.max[axis]).contains(&position);
+        if left < 0.0 || !is_there(1, y) || !is_there(2, z) {
+            return 0..0;
+        }
+        self.reach(0, radii[0] * left.sqrt())
+    }
+
+    /// The positions along an axis of chunks that come as near as `radius` to the middle.
+    fn reach(&self, axis: usize, radius: f64) -> ops::Range<i32> {
+        let (middle, extent) = (self.range.middle[axis], &self.range.extent);
+        // Conversions saturate.
+        let from = (middle - radius - 1.0 - self.by).ceil() as i32;
+        let to = ((middle + radius + self.by).floor() as i32).saturating_add(1);
+        let (from, to) = (from.max(extent.min[axis]), to.min(extent.max[axis]));
+        from..to.max(from)
+    }
+}
+
+/// The ranges of a terrain, as the viewers' and what is kept ask for them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Ranges(pub(crate) Vec<Viewed>);
+
+/// One range, in the steps that decide what becomes of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Viewed {
+    pub(crate) range: Range,
+    /// How many chunks farther away chunks stay.
+    pub(crate) margin: f64,
+    /// Within this range samples stay; `None`: everywhere.
+    pub(crate) samples: Option<Range>,
+    /// Where it looks, in the terrain's space; zero where that is not known.
+    pub(crate) forward: [f64; 3],
+}
+
+/// What ranges ask of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Wanted {
+    /// Nothing.
+    Gone,
+    /// Its samples, for the sake of its neighbours.
+    Samples,
+    /// Its mesh.
+    Mesh,
+}
+
+impl Viewed {
+    /// The ranges at whose borders something becomes of a chunk.
+    pub(crate) fn borders(&self) -> impl Iterator<Item = Grown> {
+        let stays = self.range.widened(self.margin);
+        let samples = self.samples.map(|range| [range.grown(0.0), range.widened(self.margin).grown(0.0)]);
+        [self.range.grown(0.0), self.range.grown(1.0), stays.grown(0.0), stays.grown(1.0)]
+            .into_iter()
+            .chain(samples.into_iter().flatten())
+    }
+}
+
+impl Ranges {
+    /// Whether a chunk is in range: to be drawn as soon as it can be.
+    pub(crate) fn contains(&self, position: [i32; 3]) -> bool {
+        self.0.iter().any(|viewed| viewed.range.grown(0.0).contains(position))
+    }
+
+    /// What is asked of a chunk that is `now` so.
+    pub(crate) fn wanted(&self, position: [i32; 3], now: Wanted) -> Wanted {
+        let grown = |by: f64| self.0.iter().any(|viewed| viewed.range.grown(by).contains(position));
+        let stays =
+            |by: f64| self.0.iter().any(|viewed| viewed.range.widened(viewed.margin).grown(by).contains(position));
+        if grown(0.0) || now == Wanted::Mesh && stays(0.0) {
+            Wanted::Mesh
+        } else if grown(1.0) || now >= Wanted::Samples && stays(1.0) {
+            Wanted::Samples
+        } else {
+            Wanted::Gone
+        }
+    }
+
+    /// Whether samples are to be there, where they have been dropped.
+    pub(crate) fn wants_samples(&self, position: [i32; 3]) -> bool {
+        self.0.iter().any(|viewed| {
+            viewed.samples.map_or_else(
+                || viewed.range.widened(viewed.margin).grown(1.0).contains(position),
+                |range| range.grown(0.0).contains(position),
+            )
+        })
+    }
+
+    /// Whether samples that are there may be dropped.
+    pub(crate) fn may_drop_samples(&self, position: [i32; 3]) -> bool {
+        !self.0.iter().any(|viewed| {
+            let Some(range) = viewed.samples else {
+                return viewed.range.widened(viewed.margin).grown(1.0).contains(position);
+            };
+            range.widened(viewed.margin).grown(0.0).contains(position)
+        })
+    }
+
+    /// What comes first: the lower, the sooner. Near before far, and in front before behind.
+    pub(crate) fn urgency(&self, position: [i32; 3]) -> u32 {
+        let of_viewer = |viewed: &Viewed| {
+            let distance = viewed.range.squared_distance(position);
+            let offset = viewed.range.offset(position);
+            let ahead: f64 = (0..3).map(|axis| offset[axis] * viewed.forward[axis]).sum();
+            // What is close may be turned to in no time.
+            if ahead < 0.0 && distance > 4.0 { 2.0 * distance } else { distance }
+        };
+        (16.0 * self.0.iter().map(of_viewer).fold(f64::INFINITY, f64::min)) as u32
+    }
+
+    /// Every chunk of which these ranges and `others` may ask different things, some of them several times.
+    pub(crate) fn differences(&self, others: &Self, mut take: impl FnMut([i32; 3])) {
+        let count = self.0.len().max(others.0.len());
+        for index in 0..count {
+            let (new, old) = (self.0.get(index), others.0.get(index));
+            let same_borders = |new: &Viewed, old: &Viewed| Viewed { forward: old.forward, ..*new } == *old;
+            if new.zip(old).is_some_and(|(new, old)| same_borders(new, old)) {
+                continue;
+            }
+            let [new, old] =
+                [new, old].map(|viewed| viewed.map(|v| v.borders().collect::<Vec<_>>()).unwrap_or_default());
+            for border in 0..new.len().max(old.len()) {
+                for (a, b) in [(new.get(border), old.get(border)), (old.get(border), new.get(border))] {
+                    let Some(a) = a else { continue };
+                    for (y, z, row) in a.rows() {
+                        let other = b.map_or(0..0, |b| b.row(y, z));
+                        // What of the row is before the other one, and what is behind it.
+                        let (before, behind) = if other.is_empty() {
+                            (row.clone(), 0..0)
+                        } else {
+                            (row.start..row.end.min(other.start), row.start.max(other.end)..row.end)
+                        };
+                        before.chain(behind).for_each(|x| take([x, y, z]));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const EXTENT: Region = Region { min: [-6, -4, -9], max: [7, 3, 9] };
+
+    fn all() -> impl Iterator<Item = [i32; 3]> {
+        EXTENT.grown(2, 2).points()
+    }
+
+    fn range() -> impl Strategy<Value = Range> {
+        let ellipsoid = (prop::array::uniform3(-5.0..5.0f64), prop::array::uniform3(0.1..5.0f64))
+            .prop_map(|(middle, radii)| Range::ellipsoid(middle, radii, EXTENT));
+        let boxed = (prop::array::uniform3(-6..6i32), prop::array::uniform3(0..5i32))
+            .prop_map(|(min, size)| Range::of_box(Region::new(min, [0, 1, 2].map(|i| min[i] + size[i])), EXTENT));
+        prop_oneof![ellipsoid, boxed]
+    }
+
+    fn set(grown: &Grown) -> BTreeSet<[i32; 3]> {
+        all().filter(|position| grown.contains(*position)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn rows_hold_what_the_range_contains(range in range(), by in 0..2i32) {
+            let grown = range.grown(by.into());
+            let rows: BTreeSet<_> =
+                grown.rows().flat_map(|(y, z, row)| row.map(move |x| [x, y, z])).collect();
+            prop_assert_eq!(grown.len(), rows.len() as u64);
+            prop_assert_eq!(rows, set(&grown));
+        }
+
+        #[test]
+        fn an_ellipsoid_holds_the_chunks_it_reaches(
+            middle in prop::array::uniform3(-5.0..5.0f64),
+            radii in prop::array::uniform3(0.1..5.0f64),
+        ) {
+            let range = Range::ellipsoid(middle, radii, EXTENT);
+            for position in all() {
+                let nearest = [0, 1, 2].map(|i| middle[i].clamp(position[i].into(), f64::from(position[i]) + 1.0));
+                let size: f64 = (0..3).map(|i| ((nearest[i] - middle[i]) / radii[i]).powi(2)).sum();
+                prop_assume!((size - 1.0).abs() > 1e-9);
+                prop_assert_eq!(range.grown(0.0).contains(position), size < 1.0 && EXTENT.contains(position));
+            }
+        }
+
+        #[test]
+        fn a_grown_range_holds_the_neighbours(range in range()) {
+            let plain = set(&range.grown(0.0));
+            let neighbours: BTreeSet<_> = plain
+                .iter()
+                .flat_map(|position| Region::new(position.map(|v| v - 1), position.map(|v| v + 2)).points())
+                .filter(|position| EXTENT.contains(*position))
+                .collect();
+            let grown = set(&range.grown(1.0));
+            prop_assert!(neighbours.is_subset(&grown));
+            // Where the extent cuts the range, chunks beyond it may have been the neighbours.
+            prop_assert!(!plain.is_empty() || grown.len() <= EXTENT.points().count());
+        }
+
+        #[test]
+        fn a_box_holds_its_chunks(min in prop::array::uniform3(-9..9i32), size in prop::array::uniform3(0..6i32)) {
+            let chunks = Region::new(min, [0, 1, 2].map(|i| min[i] + size[i]));
+            let expected: BTreeSet<_> = chunks.intersection(&EXTENT).points().collect();
+            prop_assert_eq!(set(&Range::of_box(chunks, EXTENT).grown(0.0)), expected);
+        }
+
+        #[test]
+        fn differences_hold_every_chunk_whose_lot_changes(a in range(), b in range(), margin in 0.0..2.0f64) {
+            let viewed = |range| Viewed { range, margin, samples: None, forward: [0.0; 3] };
+            let (new, old) = (Ranges(vec![viewed(a)]), Ranges(vec![viewed(b)]));
+            let mut found = BTreeSet::new();
+            new.differences(&old, |position| { found.insert(position); });
+            for position in all() {
+                for now in [Wanted::Gone, Wanted::Samples, Wanted::Mesh] {
+                    if new.wanted(position, now) != old.wanted(position, now) {
+                        prop_assert!(found.contains(&position), "{position:?} as {now:?}");
+                    }
+                }
+            }
+        }
+    }
+}
