@@ -1,8 +1,8 @@
-//! Terrain in a [`big_space`](::big_space), where nothing shakes however far one goes from the origin.
+//! Terrain in a big space (the crate `big_space`), where nothing shakes however far one goes from the origin.
 //!
 //! A terrain whose entity is a `Grid` has its chunks in the grid's cells: each chunk's entity gets a `CellCoord` and a
 //! `Transform` relative to that cell's middle, both computed in double precision from the chunk's position, in the update that
-//! spawns it. Rays, [`TerrainQuery`](crate::query::TerrainQuery) and viewers then go by the grid's exact
+//! spawns it. [`TerrainQuery`](crate::query::TerrainQuery) and viewers then go by the grid's exact
 //! place relative to the floating origin. World space is relative to the floating origin's cell, as everywhere in a big space.
 //!
 //! # How to set it up
@@ -10,7 +10,6 @@
 //! use bevy_app::prelude::*;
 //! use bevy_ecs::prelude::*;
 //! use bevy_marchless::prelude::*;
-//! use bevy_math::Vec3;
 //! use bevy_transform::components::Transform;
 //! use big_space::prelude::*;
 //!
@@ -25,10 +24,10 @@
 //! fn setup(mut commands: Commands) {
 //!     commands.spawn_big_space_default(|space| {
 //!         let source = |[x, y, z]: [f64; 3]| y - 40.0 - 8.0 * (x * 0.05).sin() * (z * 0.04).cos();
-//!         let mut terrain = space.spawn_grid(Grid::default(), Terrain::new(source));
+//!         let mut terrain = space.spawn_grid(Grid::default(), Terrain::endless(source));
 //!         // Ten million units along x; a camera goes here.
 //!         let (cell, place) = (CellCoord::new(5_000, 0, 0), Transform::from_xyz(0.0, 60.0, 0.0));
-//!         terrain.spawn_spatial((FloatingOrigin, cell, place));
+//!         terrain.spawn_spatial((FloatingOrigin, TerrainViewer::new(256.0), cell, place));
 //!     });
 //! }
 //! ```
@@ -40,11 +39,10 @@
 //! - The terrain's source, stamps and hits are in the terrain's own space, in double precision, from its lattice's origin on.
 //!
 //! # Order of systems
-//! Chunks are placed by observers, when they are spawned in
-//! [`MarchlessSystems::Prepare`](crate::schedule::MarchlessSystems::Prepare) or later; all of
-//! [`MarchlessSystems`](crate::schedule::MarchlessSystems) runs before `TransformSystems::Propagate`, in which `big_space` does
-//! its own propagation. So a chunk is where it belongs in the very update that spawns it. Queries in `Update` see
-//! the floating origin where it was when transforms were last propagated, like every `GlobalTransform`.
+//! Chunks are placed by observers, as they are spawned in [`MarchlessSystems::Work`]. All of [`MarchlessSystems`] runs before
+//! `TransformSystems::Propagate`, in which `big_space` does its own propagation, so that a chunk is where it belongs in the very
+//! update that spawns it. Queries in `Update` see the floating origin where it was when transforms were last propagated, like
+//! every `GlobalTransform`.
 //!
 //! # What it costs
 //! Two more components, and one or two moves between archetypes as a chunk is spawned. Where the terrain's grid takes part in
