@@ -164,6 +164,39 @@ fn ten_million_voxels_away_everything_is_the_same() {
 }
 
 #[test]
+fn a_viewer_loads_what_is_around_it() {
+    let world = |offset: IVec3| {
+        let origin = (offset * CELLS).as_dvec3();
+        let waves = move |p: [f64; 3]| {
+            let p = DVec3::from(p) - origin;
+            p.y - 6.0 * (p.x * 0.1).sin() * (p.z * 0.07).cos()
+        };
+        let mut app = space_app(false);
+        let terrain = Terrain::endless(waves).with_chunk_cells(CELLS as u32);
+        let (terrain, viewer) = spawn(&mut app, terrain, EDGE, cell_of(offset));
+        app.world_mut().entity_mut(viewer).insert(TerrainViewer::new(50.0));
+        (app, terrain, viewer)
+    };
+    let (mut near, mut far) = (world(IVec3::ZERO), world(FAR));
+    let mut former = BTreeMap::new();
+    // Where it is, within the same cell, and into another one.
+    for step in [0.0, 300.0, EDGE] {
+        for (app, terrain, viewer) in [&mut near, &mut far] {
+            app.world_mut().get_mut::<Transform>(*viewer).expect("it has a place").translation.x += step;
+            // It is followed as soon as its new place has been propagated.
+            app.update();
+            app.update();
+            settle(app, *terrain);
+        }
+        let [here, there] = [drawn(&mut near.0, IVec3::ZERO), drawn(&mut far.0, FAR)];
+        assert!(here.len() > 12 && here == there, "{} and {} chunks", here.len(), there.len());
+        assert!(former.keys().all(|position| !here.contains_key(position)), "those before are gone");
+        former = here;
+    }
+    assert!(near.0.world().get::<CellCoord>(near.2).expect("it has a cell").x > 0, "it went to another cell");
+}
+
+#[test]
 fn positions_in_world_space_and_in_the_lattice_belong_together() {
     // The distance of the floating origin's cell is no `f32`.
     let (edge, cell) = (500.5, CellCoord::new(19_981, -19_981, 19_981));
