@@ -175,7 +175,7 @@ impl Start<'_, '_, '_> {
         let mut no_longer_drawn = BTreeSet::new();
         let (mut done, mut later) = (0, Vec::new());
         while let Some(key) = ready.pop() {
-            let Some(state) = volume.chunks.get_mut(&key) else { continue };
+            let Some(state) = volume.chunks.get(&key) else { continue };
             let is_ready = state.wanted == Wanted::Mesh && state.missing == 0 && (!state.drawn || state.stale);
             if !is_ready || volume.pending.iter().any(|pending| pending.chunks.contains(&key)) {
                 // Gone, or meshed already; or it will be, with the changed ones.
@@ -183,8 +183,8 @@ impl Start<'_, '_, '_> {
             }
             if volume.claims.contains_key(&key) {
                 later.push(key);
-            } else if volume.grid.neighbourhood(key.position).is_uniform() {
-                if state.empty {
+            } else if volume.is_without_surface(key) || volume.grid.neighbourhood(key.position).is_uniform() {
+                if let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.empty) {
                     (state.drawn, state.stale) = (true, false);
                     volume.streaming.may_drop_more = true;
                     if let Some(chunk) = volume.grid.chunk(key.position) {

@@ -3,6 +3,7 @@
 mod extent;
 mod fill;
 mod prepare;
+mod signs;
 mod volume;
 
 use core::fmt;
@@ -22,6 +23,7 @@ pub use extent::{Extent, Keep};
 
 pub(crate) use fill::{FillResults, fill_chunk};
 pub(crate) use prepare::prepare_terrains;
+pub(crate) use signs::Signs;
 pub use volume::TerrainVolume;
 pub(crate) use volume::{ChunkState, Fill, Group, Pending, same_samples};
 

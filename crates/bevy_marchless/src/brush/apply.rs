@@ -10,7 +10,7 @@ use super::{Stamp, TerrainEdited};
 use crate::chunk::ChunkKey;
 use crate::stats::{MainThread, Since, Stats};
 use crate::stream::free_samples_for;
-use crate::terrain::TerrainVolume;
+use crate::terrain::{Signs, TerrainVolume};
 
 /// Stamps that have been read but not applied, in order.
 #[derive(Resource, Default)]
@@ -108,6 +108,9 @@ fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Sta
     let edit = volume.grid.apply_to_chunk(position, stamp);
     if !edit.is_empty() {
         volume.edited.insert(position);
+        if let Some(state) = volume.chunks.get_mut(&ChunkKey::finest(position)) {
+            state.signs = Signs::UNKNOWN;
+        }
     }
     volume.edit.merge(&edit);
 }

@@ -19,7 +19,7 @@ use crate::chunk::ChunkKey;
 use crate::place::{Place, in_double_precision};
 use crate::schedule::MarchlessSettings;
 use crate::stats::MainThread;
-use crate::terrain::{ChunkState, Fill, FillResults, Terrain, TerrainVolume, fill_chunk};
+use crate::terrain::{ChunkState, Fill, FillResults, Signs, Terrain, TerrainVolume, fill_chunk};
 use crate::work::{Ticket, WorkQueue};
 
 /// Viewers' positions are rounded to this part of a chunk, so that small steps change nothing.
@@ -113,11 +113,12 @@ impl Streaming {
     fn change(&mut self, new: Ranges) {
         let old = core::mem::replace(&mut self.ranges, new);
         self.drops = self.ranges.0.iter().any(|viewed| viewed.samples.is_some());
-        let (arriving, leaving, ranges) = (&mut self.arriving, &mut self.leaving, &self.ranges);
-        ranges.differences(&old, |position| {
-            let is_wanted = ranges.wanted(position, Wanted::Gone) > Wanted::Gone;
-            if is_wanted { &mut *arriving } else { &mut *leaving }.push(ChunkKey::finest(position));
-        });
+        let (arriving, leaving) = (&mut self.arriving, &mut self.leaving);
+        self.ranges.differences(
+            &old,
+            |position| arriving.push(ChunkKey::finest(position)),
+            |position| leaving.push(ChunkKey::finest(position)),
+        );
         self.sort();
     }
 
@@ -298,6 +299,7 @@ impl Follow<'_, '_, '_> {
             extent: terrain.chunk_region(),
             cells: terrain.chunk_cells,
             spacing: f64::from(terrain.voxel_size),
+            isovalue: terrain.isovalue,
         };
         let mut done = 0;
         while let Some(key) = self.volume.streaming.arriving.pop() {
@@ -349,13 +351,14 @@ impl Follow<'_, '_, '_> {
     }
 
     /// Fills a chunk at once where that needs no job.
-    fn fill(&mut self, key: ChunkKey, Asked { source, cells, spacing, .. }: &Asked) {
+    fn fill(&mut self, key: ChunkKey, Asked { source, cells, spacing, isovalue, .. }: &Asked) {
         let volume = &mut *self.volume;
         if volume.grid.chunk(key.position).is_some() {
             volume.take_samples(key, None);
         } else if let Some(chunk) = volume.streaming.bound(source.as_ref(), key.position, *cells, *spacing) {
             self.stats.bounded += 1;
-            volume.take_samples(key, Some(chunk));
+            let signs = Signs::of(&chunk, *isovalue);
+            volume.take_samples(key, Some((chunk, signs)));
         } else if let Some(state) = volume.chunks.get_mut(&key) {
             state.fill = Fill::Waiting;
             volume.streaming.to_fill.push(key);
@@ -426,13 +429,21 @@ struct Asked {
     extent: Region,
     cells: u32,
     spacing: f64,
+    isovalue: f32,
 }
 
 impl TerrainVolume {
     /// Takes in a chunk's samples, `None` where the grid has them already, and the stamps that came before them.
-    pub(crate) fn take_samples(&mut self, key: ChunkKey, chunk: Option<Chunk<i16>>) {
-        if let Some(chunk) = chunk {
+    pub(crate) fn take_samples(&mut self, key: ChunkKey, samples: Option<(Chunk<i16>, Signs)>) {
+        if let Some((chunk, signs)) = samples {
             self.grid.load(key.position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
+            if let Some(state) = self.chunks.get_mut(&key) {
+                // At the border the samples have been clipped.
+                let at_border = self.grid.bounds().is_some_and(|bounds| {
+                    (0..3).any(|axis| [bounds.min[axis], bounds.max[axis] - 1].contains(&key.position[axis]))
+                });
+                state.signs = if at_border { Signs::UNKNOWN } else { signs };
+            }
         }
         apply_waiting_stamps(self, key.position);
         self.set_filled(key);

@@ -160,13 +160,20 @@ pub(crate) enum Wanted {
 }
 
 impl Viewed {
-    /// The ranges at whose borders something becomes of a chunk.
-    pub(crate) fn borders(&self) -> impl Iterator<Item = Grown> {
+    /// The ranges into which chunks come: those that are drawn, and those with samples for them; where samples are wanted again.
+    fn entries(&self) -> [Option<Grown>; 3] {
+        [Some(self.range.grown(0.0)), Some(self.range.grown(1.0)), self.samples.map(|samples| samples.grown(0.0))]
+    }
+
+    /// The same, out of which they go.
+    fn exits(&self) -> [Option<Grown>; 3] {
         let stays = self.range.widened(self.margin);
-        let samples = self.samples.map(|range| [range.grown(0.0), range.widened(self.margin).grown(0.0)]);
-        [self.range.grown(0.0), self.range.grown(1.0), stays.grown(0.0), stays.grown(1.0)]
-            .into_iter()
-            .chain(samples.into_iter().flatten())
+        let samples = self.samples.map(|samples| samples.widened(self.margin).grown(0.0));
+        [Some(stays.grown(0.0)), Some(stays.grown(1.0)), samples]
+    }
+
+    fn has_borders_of(&self, other: &Self) -> bool {
+        Self { forward: other.forward, ..*self } == *other
     }
 }
 
@@ -222,32 +229,35 @@ impl Ranges {
         (16.0 * self.0.iter().map(of_viewer).fold(f64::INFINITY, f64::min)) as u32
     }
 
-    /// Every chunk of which these ranges and `others` may ask different things, some of them several times.
-    pub(crate) fn differences(&self, others: &Self, mut take: impl FnMut([i32; 3])) {
-        let count = self.0.len().max(others.0.len());
-        for index in 0..count {
-            let (new, old) = (self.0.get(index), others.0.get(index));
-            let same_borders = |new: &Viewed, old: &Viewed| Viewed { forward: old.forward, ..*new } == *old;
-            if new.zip(old).is_some_and(|(new, old)| same_borders(new, old)) {
+    /// The chunks that come into these ranges from `old` ones, and those that go out of the old ones.
+    pub(crate) fn differences(&self, old: &Self, mut come: impl FnMut([i32; 3]), mut go: impl FnMut([i32; 3])) {
+        for index in 0..self.0.len().max(old.0.len()) {
+            let (new, old) = (self.0.get(index), old.0.get(index));
+            if new.zip(old).is_some_and(|(new, old)| new.has_borders_of(old)) {
                 continue;
             }
-            let [new, old] =
-                [new, old].map(|viewed| viewed.map(|v| v.borders().collect::<Vec<_>>()).unwrap_or_default());
-            for border in 0..new.len().max(old.len()) {
-                for (a, b) in [(new.get(border), old.get(border)), (old.get(border), new.get(border))] {
-                    let Some(a) = a else { continue };
-                    for (y, z, row) in a.rows() {
-                        let other = b.map_or(0..0, |b| b.row(y, z));
-                        // What of the row is before the other one, and what is behind it.
-                        let (before, behind) = if other.is_empty() {
-                            (row.clone(), 0..0)
-                        } else {
-                            (row.start..row.end.min(other.start), row.start.max(other.end)..row.end)
-                        };
-                        before.chain(behind).for_each(|x| take([x, y, z]));
-                    }
-                }
+            let borders =
+                |viewed: Option<&Viewed>, of: fn(&Viewed) -> [Option<Grown>; 3]| viewed.map(of).unwrap_or_default();
+            difference(borders(new, Viewed::entries), borders(old, Viewed::entries), &mut come);
+            difference(borders(old, Viewed::exits), borders(new, Viewed::exits), &mut go);
+        }
+    }
+}
+
+/// What is in ranges and not in others, border by border. The second border is around the first.
+fn difference(these: [Option<Grown>; 3], others: [Option<Grown>; 3], take: &mut impl FnMut([i32; 3])) {
+    for (border, range) in these.iter().enumerate() {
+        let Some(range) = range else { continue };
+        for (y, z, mut row) in range.rows() {
+            let other = others[border].map_or(0..0, |other| other.row(y, z));
+            let other = if other.is_empty() { row.start..row.start } else { other };
+            // Of the first, what lies beyond the other's second is in the second's difference, too.
+            if border == 0 {
+                let around = others[1].map_or(0..0, |around| around.row(y, z));
+                row = row.start.max(around.start)..row.end.min(around.end);
             }
+            (row.start..row.end.min(other.start)).for_each(|x| take([x, y, z]));
+            (row.start.max(other.end)..row.end).for_each(|x| take([x, y, z]));
         }
     }
 }
@@ -327,12 +337,14 @@ mod tests {
         fn differences_hold_every_chunk_whose_lot_changes(a in range(), b in range(), margin in 0.0..2.0f64) {
             let viewed = |range| Viewed { range, margin, samples: None, forward: [0.0; 3] };
             let (new, old) = (Ranges(vec![viewed(a)]), Ranges(vec![viewed(b)]));
-            let mut found = BTreeSet::new();
-            new.differences(&old, |position| { found.insert(position); });
+            let (mut come, mut gone) = (BTreeSet::new(), BTreeSet::new());
+            new.differences(&old, |position| { come.insert(position); }, |position| { gone.insert(position); });
             for position in all() {
                 for now in [Wanted::Gone, Wanted::Samples, Wanted::Mesh] {
-                    if new.wanted(position, now) != old.wanted(position, now) {
-                        prop_assert!(found.contains(&position), "{position:?} as {now:?}");
+                    let wanted = new.wanted(position, now);
+                    if old.wanted(position, now) == now && wanted != now {
+                        let found = if wanted > now { &come } else { &gone };
+                        prop_assert!(found.contains(&position), "{:?} as {:?}", position, now);
                     }
                 }
             }

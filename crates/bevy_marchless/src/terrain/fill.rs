@@ -8,7 +8,7 @@ use bevy_ecs::prelude::*;
 use bevy_platform::time::Instant;
 use marchless::Chunk;
 
-use super::{Fill, Terrain, TerrainVolume};
+use super::{Fill, Signs, Terrain, TerrainVolume};
 use crate::brush::apply_waiting_stamps;
 use crate::chunk::ChunkKey;
 use crate::schedule::MarchlessSettings;
@@ -28,11 +28,16 @@ pub(crate) struct Filled {
     terrain: Entity,
     filling: u64,
     position: [i32; 3],
-    /// The samples, and whether the source filled them; `None` where it panicked.
-    chunk: Option<(Chunk<i16>, bool)>,
-    /// Whether they all lie on one side of the surface.
-    is_empty: bool,
+    /// `None` where the source panicked.
+    sampled: Option<Sampled>,
     time: Duration,
+}
+
+struct Sampled {
+    chunk: Chunk<i16>,
+    signs: Signs,
+    /// Whether the source filled it, instead of being certain of it.
+    filled: bool,
 }
 
 /// Asks for the samples of a chunk; those of the lowest `urgency` come first.
@@ -51,21 +56,12 @@ pub(crate) fn fill_chunk(
         let start = Instant::now();
         let sample = || Chunk::from_source_counted(source.as_ref(), position, cells, spacing);
         let chunk = catch_unwind(AssertUnwindSafe(sample)).ok();
-        let is_empty = chunk.as_ref().is_none_or(|(chunk, _)| !has_surface(chunk, isovalue));
-        results.push(Filled { terrain: entity, filling, position, chunk, is_empty, time: start.elapsed() });
+        let chunk = chunk.map(|(chunk, filled)| {
+            let signs = Signs::of(&chunk, isovalue);
+            Sampled { chunk, signs, filled }
+        });
+        results.push(Filled { terrain: entity, filling, position, sampled: chunk, time: start.elapsed() });
     })
-}
-
-/// Whether some samples lie inside and some outside.
-fn has_surface(chunk: &Chunk<i16>, isovalue: f32) -> bool {
-    match chunk {
-        Chunk::Uniform(_) => false,
-        Chunk::Samples(samples) => {
-            let threshold = isovalue * 256.0;
-            let inside = samples.weights.iter().filter(|weight| f32::from(**weight) < threshold).count();
-            inside > 0 && inside < samples.weights.len()
-        }
-    }
 }
 
 /// Takes sampled chunks into their volumes, with the stamps that came before them.
@@ -85,25 +81,24 @@ pub(crate) fn take_filled_chunks(
         && let Some(filled) = waiting.pop_front()
     {
         taken += 1;
-        let Filled { terrain, filling, position, chunk, is_empty, time } = filled;
+        let Filled { terrain, filling, position, sampled, time } = filled;
         let Ok(mut volume) = volumes.get_mut(terrain) else { continue };
         if volume.filling != filling {
             continue;
         }
         stats.fill_time += time;
-        let was_filled = chunk.as_ref().is_some_and(|(_, filled)| *filled);
-        stats.filled += u64::from(was_filled);
-        stats.filled_empty += u64::from(was_filled && is_empty);
-        let (chunk, _) = chunk.unwrap_or_else(|| {
+        let Sampled { chunk, signs, filled } = sampled.unwrap_or_else(|| {
             bevy_log::error_once!("a terrain's source panicked; chunk {position:?} of terrain {terrain} stays air");
-            (Chunk::AIR, false)
+            Sampled { chunk: Chunk::AIR, signs: Signs::UNKNOWN, filled: false }
         });
+        stats.filled += u64::from(filled);
+        stats.filled_empty += u64::from(filled && !signs.may_have_surface());
         let (volume, key) = (&mut *volume, ChunkKey::finest(position));
         let is_remote = volume.streaming.take_remote(position);
         match volume.chunks.get(&key).map(|state| &state.fill) {
             Some(Fill::Asked(_)) => {
                 volume.streaming.job_is_over();
-                volume.take_samples(key, Some(chunk));
+                volume.take_samples(key, Some((chunk, signs)));
             }
             None if is_remote => {
                 volume.grid.load(position, chunk).expect("stamps wait within the extent only");

@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use bevy_transform::components::Transform;
 use marchless::Grid;
 
-use super::{Fill, Terrain, TerrainError, TerrainVolume};
+use super::{Fill, Signs, Terrain, TerrainError, TerrainVolume};
 use crate::chunk::{Chunk, ChunkKey, chunk_transform};
 use crate::stats::MainThread;
 use crate::work::new_number;
@@ -32,6 +32,9 @@ pub(crate) fn prepare_terrains(
         volume.colors = Arc::new(terrain.palette.to_vertex_colors());
         match &before {
             Some(old) if same_samples(old, terrain) => {
+                if old.isovalue != terrain.isovalue {
+                    volume.chunks.values_mut().for_each(|state| state.signs = Signs::UNKNOWN);
+                }
                 if !same_meshes(old, terrain) {
                     let all = volume.chunks.keys().map(|key| key.position).collect();
                     volume.add_changed(all, None);
@@ -75,6 +78,7 @@ fn refill(terrain: &Terrain, volume: &mut TerrainVolume) {
     volume.unfilled = volume.chunks.len();
     for (key, state) in &mut volume.chunks {
         state.fill = Fill::Unasked;
+        state.signs = Signs::UNKNOWN;
         state.missing = key.around().filter(|near| extent.contains(near.position)).count() as u8;
         state.stale = state.drawn;
     }

@@ -9,7 +9,7 @@ use bevy_platform::collections::{HashMap, HashSet};
 use bevy_reflect::prelude::*;
 use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, Region, Stamp};
 
-use super::Terrain;
+use super::{Signs, Terrain};
 use crate::bits::BitsCache;
 use crate::chunk::ChunkKey;
 use crate::mesh::{Colors, Meshed};
@@ -93,6 +93,7 @@ pub(crate) struct ChunkState {
     pub(crate) drawn: bool,
     /// Whether nothing is shown of it.
     pub(crate) empty: bool,
+    pub(crate) signs: Signs,
     /// Whether what is drawn is older than the samples because some around it were missing.
     pub(crate) stale: bool,
 }
@@ -306,6 +307,17 @@ impl TerrainVolume {
         }
     }
 
+    /// Whether a chunk is known to have no surface.
+    pub(crate) fn is_without_surface(&self, key: ChunkKey) -> bool {
+        let ChunkKey { level, position } = key;
+        self.chunks.get(&key).is_some_and(|state| {
+            state.signs.are_without_surface(|step| {
+                let position = [0, 1, 2].map(|axis| position[axis].saturating_add(step[axis]));
+                self.chunks.get(&ChunkKey { level, position }).map(|state| state.signs)
+            })
+        })
+    }
+
     /// How many chunks around a place, itself included, have to be filled and are not.
     pub(crate) fn missing_around(&self, key: ChunkKey, extent: Region) -> u8 {
         let is_missing =
@@ -366,6 +378,7 @@ impl ChunkState {
             missing,
             drawn: false,
             empty: true,
+            signs: Signs::UNKNOWN,
             stale: false,
         }
     }
