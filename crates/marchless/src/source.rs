@@ -5,6 +5,10 @@ use alloc::sync::Arc;
 
 use crate::lattice::{Shape, ShapeError};
 
+/// How many points around a region must be bounded as well before it is left unsampled: brushes and isovalues reach four
+/// voxels from the surface.
+pub(crate) const BOUND_MARGIN: u32 = 4;
+
 /// The box of lattice points that a [`Source`] is asked about.
 ///
 /// Positions are integers, and only [`SourceRegion::position`] turns them into world units, in `f64`: nothing is
@@ -99,12 +103,16 @@ pub trait Source: Send + Sync + 'static {
         Bound::Mixed
     }
 
-    /// The same, asked where sampling comes next: an answer may cost about as much as one layer of samples.
+    /// The same and more, asked where sampling comes next: an answer may cost about as much as one layer of samples.
+    ///
+    /// What is left unsampled may lie beside what is sampled, and isovalues may differ from 0 by three voxels. So anything
+    /// but [`Bound::Mixed`] says here as well that all samples would be 3 or more, or −3 or less. By default this is what
+    /// [`Source::bound`] says of the region and four points around it.
     ///
     /// Whoever streams chunks asks for [`Source::bound`] on the thread that must not wait, of single chunks and of larger
     /// boxes; and for this one in the job that samples.
     fn bound_closely(&self, region: &SourceRegion) -> Bound {
-        self.bound(region)
+        self.bound(&region.grown(BOUND_MARGIN))
     }
 }
 

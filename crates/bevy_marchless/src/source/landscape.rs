@@ -121,7 +121,7 @@ impl Landscape {
     fn region<'a>(&self, region: &SourceRegion, columns: Option<Window<'a>>) -> Region<'a> {
         let sides = world_box(region).map(|[low, high]| Interval { low, high });
         let reach = self.compiled.rules.deepest.max(ROOM * region.spacing);
-        Region { sides, spacing: region.spacing, reach, columns }
+        Region { sides, spacing: region.spacing, reach, margin: ROOM * region.spacing, strictly: false, columns }
     }
 
     /// The columns of each ground in a region.
@@ -198,20 +198,24 @@ impl Source for Landscape {
     }
 
     fn bound_closely(&self, samples: &SourceRegion) -> Bound {
-        let bound = self.bound(samples);
+        let margin = CLOSE * samples.spacing;
+        let region = Region { margin, strictly: true, ..self.region(samples, None) };
         let most = samples.size[0].max(samples.size[2]);
-        if bound != Bound::Mixed || samples.is_empty() || most > MOST_COLUMNS {
-            return bound;
-        }
         let mut calls = 0;
-        let columns = self.columns(samples, &mut calls);
-        let part = [0..samples.size[0] as usize, 0..samples.size[2] as usize];
-        let window = Window { columns: &columns, width: samples.size[0] as usize, part };
-        let bound = self.certain(&self.region(samples, Some(window)), true, &mut calls);
+        let mut bound = self.certain(&region, false, &mut calls);
+        if bound == Bound::Mixed && !samples.is_empty() && most <= MOST_COLUMNS {
+            let columns = self.columns(samples, &mut calls);
+            let part = [0..samples.size[0] as usize, 0..samples.size[2] as usize];
+            let columns = Some(Window { columns: &columns, width: samples.size[0] as usize, part });
+            bound = self.certain(&Region { columns, ..region }, true, &mut calls);
+        }
         self.count(calls);
         bound
     }
 }
+
+/// Samples as many voxels from the surface may be left out: isovalues reach that far.
+const CLOSE: f64 = 3.0;
 
 /// Regions that are wider are not looked at column by column.
 const MOST_COLUMNS: u32 = 512;

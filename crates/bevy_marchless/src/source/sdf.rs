@@ -395,6 +395,11 @@ impl Source for Sdf {
             Bound::Mixed
         }
     }
+
+    fn bound_closely(&self, region: &SourceRegion) -> Bound {
+        // With room around it already.
+        self.bound(region)
+    }
 }
 
 /// The middle and radius of the smallest ball that holds all samples of a region.

@@ -7,11 +7,7 @@ use alloc::vec::Vec;
 use super::border::{Border, larger, layer_indices};
 use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS};
 use crate::sample::{Voxel, Weight};
-use crate::source::{Bound, Source, SourceRegion};
-
-/// How many points around a chunk must be bounded as well before it is left unsampled: brushes and isovalues reach
-/// four voxels from the surface.
-const BOUND_MARGIN: u32 = 4;
+use crate::source::{BOUND_MARGIN, Bound, Source, SourceRegion};
 
 /// The samples of one chunk. Cloning is cheap, and the clone is unaffected by later edits.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,9 +33,8 @@ impl<W: Weight> Chunk<W> {
 
     /// Samples `source` for the chunk at chunk position `position`; runs on any thread.
     ///
-    /// The source is asked for a [close bound](Source::bound_closely) first, of the chunk and four points around it: then
-    /// the distances that are left out are too far from the surface to matter to it, for isovalues within ±3 voxels.
-    /// `cells`: 8 to 62, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit in `i32`
+    /// The source is asked for a [close bound](Source::bound_closely) of the chunk first: the distances that are left out
+    /// are too far from the surface to matter to it, for isovalues within ±3 voxels. `cells`: 8 to 62, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit in `i32`
     /// gives the chunk nearest to it; no grid takes it.
     pub fn from_source(source: &(impl Source + ?Sized), position: [i32; 3], cells: u32, spacing: f64) -> Self {
         Self::from_source_counted(source, position, cells, spacing).0
@@ -75,7 +70,7 @@ impl<W: Weight> Chunk<W> {
         spacing: f64,
     ) -> (Self, bool) {
         let region = source_region(position, 1, cells, spacing);
-        match Self::from_bound(source.bound_closely(&region.grown(BOUND_MARGIN))) {
+        match Self::from_bound(source.bound_closely(&region)) {
             Some(chunk) => (chunk, false),
             None => (Self::sampled(source, &region), true),
         }

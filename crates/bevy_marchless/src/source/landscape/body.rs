@@ -69,6 +69,10 @@ pub(super) struct Region<'a> {
     pub(super) spacing: f64,
     /// Distances beyond this are all alike. Units: world.
     pub(super) reach: f64,
+    /// How far from the surface samples must be to be left out. Units: world.
+    pub(super) margin: f64,
+    /// Whether grounds keep the margin by the measure of their samples, and not only along y.
+    pub(super) strictly: bool,
     /// The columns of each ground, by its number, where they are to be looked at: all of them, and which part of them
     /// lies in the box, along x and z.
     pub(super) columns: Option<Window<'a>>,
@@ -88,16 +92,15 @@ pub(super) struct Window<'a> {
 pub(super) struct Known {
     /// Between which values all distances lie. Units: world.
     pub(super) distance: Interval,
-    /// The same with some room to both sides, for what isovalues other than zero need.
+    /// The same with the margin to both sides.
     pub(super) roomy: Interval,
     /// What solid samples are made of, where that is certain.
     pub(super) matter: Option<u16>,
 }
 
 impl Known {
-    /// `room`: to either side.
-    fn new(distance: Interval, room: f64, matter: Option<u16>) -> Self {
-        let roomy = Interval { low: distance.low - room, high: distance.high + room };
+    fn new(distance: Interval, region: &Region, matter: Option<u16>) -> Self {
+        let roomy = Interval { low: distance.low - region.margin, high: distance.high + region.margin };
         Self { distance, roomy, matter }
     }
 
@@ -142,9 +145,9 @@ impl Body {
     /// What is known of it in a box. `noisily`: whether to evaluate noise for it, once for each noise.
     pub(super) fn known(&self, region: &Region, noisily: bool, calls: &mut u64) -> Known {
         match self {
-            Self::Everything => Known::new(Interval::exactly(f64::NEG_INFINITY), 0.0, Some(BY_RULES)),
+            Self::Everything => Known::new(Interval::exactly(f64::NEG_INFINITY), region, Some(BY_RULES)),
             Self::Ground(ground) => ground.known(region, noisily, calls),
-            Self::Noise(noise) => Known::new(noise.distance(region, noisily, calls), region.room(), Some(BY_RULES)),
+            Self::Noise(noise) => Known::new(noise.distance(region, noisily, calls), region, Some(BY_RULES)),
             Self::Shape(shape) => {
                 let (center, radius) = region.ball();
                 let distance = shape.sample(center).0;
@@ -152,7 +155,7 @@ impl Body {
                 let more = radius + if rounding.is_finite() { rounding } else { 0.0 };
                 let distance = Interval { low: distance - more, high: distance + more };
                 let material = if distance.low < 0.0 { shape.only_material_around(center, radius) } else { None };
-                Known::new(distance, region.room(), material.map(u16::from))
+                Known::new(distance, region, material.map(u16::from))
             }
             Self::Union(parts) => {
                 let parts = parts.iter().map(|part| part.known(region, noisily, calls).map(|d| far(d, region.reach)));
@@ -208,7 +211,7 @@ fn deep(distance: Interval, reach: f64) -> Interval {
 }
 
 impl Region<'_> {
-    /// How far from the surface chunks are left out. Units: world.
+    /// What is farther outside is not cut any more. Units: world.
     pub(super) fn room(&self) -> f64 {
         crate::source::ROOM * self.spacing
     }
@@ -231,23 +234,20 @@ impl Ground {
             // A slope makes distances smaller, and keeps their sign.
             let low = if above.low > 0.0 { above.low * flat } else { above.low };
             let high = if above.high < 0.0 { above.high * flat } else { above.high };
-            let room = region.room();
-            let roomy = Interval { low: above.low - room, high: above.high + room };
-            return Known { distance: Interval { low, high }, roomy, matter: Some(BY_RULES) };
+            let known = Known::new(Interval { low, high }, region, Some(BY_RULES));
+            // From far away, heights tell more than the steepest slope that there may be.
+            let roomy = Interval { low: above.low - region.margin, high: above.high + region.margin };
+            return if region.strictly { known } else { Known { roomy, ..known } };
         };
-        let (mut distance, mut roomy) = (Interval::NOTHING, Interval::NOTHING);
+        let mut distance = Interval::NOTHING;
         for row in window.part[1].clone() {
             let columns = &window.columns[self.number][window.width * row..];
             for column in &columns[window.part[0].clone()] {
-                let lengthened = (1.0 + column.slope * column.slope).sqrt();
-                let [low, high] = [y.low, y.high].map(|y| (y - column.height) / lengthened);
-                // So that samples `ROOM` farther in are `ROOM` from the surface by their own measure.
-                let room = region.room() * (1.0 - 1.0 / lengthened);
+                let [low, high] = [y.low, y.high].map(|y| column.distance(y - column.height));
                 distance = Interval { low: distance.low.min(low), high: distance.high.max(high) };
-                roomy = Interval { low: roomy.low.min(low - room), high: roomy.high.max(high + room) };
             }
         }
-        Known { distance, roomy, matter: Some(BY_RULES) }
+        Known::new(distance, region, Some(BY_RULES))
     }
 }
 
