@@ -4,20 +4,52 @@
 //!
 //! | you have | take | chunks skipped without sampling | time to fill |
 //! |---|---|---|---|
-//! | nothing yet: rolling hills, ridges | [`NoiseHeights`] (feature `noise`) | above and below the hills | once per column |
-//! | a wish for caves and overhangs | [`NoiseDensity`] (feature `noise`) | above its ground | once per sample: the slowest |
+//! | nothing yet: rolling hills, ridges | [`NoiseHeights`] (feature `noise`) | all but those at the surface | once per column |
+//! | a wish for caves and overhangs | [`NoiseDensity`] (feature `noise`) | above its ground | once per sample |
+//! | a world of your own: ridges, terraces, caves, rules for materials | [`Landscape`] (feature `noise`) | as its parts | as its parts |
 //! | real elevation, or a painted picture | [`HeightMap`] (feature `png`) | above and below its relief | once per column |
 //! | geometry: asteroids, rooms, tunnels | [`Sdf`] | wherever the surface is far | once per sample and nearby shape |
 //! | a formula | a closure `Fn([f64; 3]) -> f64` | none | once per sample |
+//! | a formula that changes no faster than you know | [`Lipschitz`] | wherever the surface is far | once per sample |
 //! | an empty space to draw in | [`Air`] | all | nothing |
-//! | something else | your own [`Source`] | those that its `bound` names | yours |
+//! | something else | your own [`Source`] | those that its bounds name | yours |
 //!
 //! All of them say how far from the surface a point is: negative inside, positive outside. Near the surface this should
 //! be close to a true distance, since it decides where the mesh's vertices lie and how smooth its normals are; far away
 //! only the sign matters. Positions are in world units in the terrain's own space, whose origin is the terrain's lowest
 //! corner and in which y points up.
 //!
-//! Materials come from the source too: an [`Sdf`] has one per shape, noise and height maps take theirs from a list of [`Stratum`].
+//! Materials come from the source too: an [`Sdf`] has one per shape, noise and height maps take theirs from a list of [`Stratum`],
+//! a landscape from one of [`MaterialRule`].
+//!
+//! # Composing one
+//! A [`Landscape`] is made of [`LandscapeSettings`], plain data: a [`Solid`] of [`Layer`]s, [`Caves`], [`Tunnels`] and shapes,
+//! and rules for materials. Bounds compose with it, and so does what is evaluated: heights once per column, kept for the
+//! chunks above and below; 3-D noise nowhere above the ground.
+//!
+//! ```
+//! # #[cfg(feature = "noise")] {
+//! use bevy_marchless::source::*;
+//!
+//! let noise = |seed, zoom, octaves| Fractal { seed, zoom, octaves, ..Fractal::default() };
+//! let hills = Layer::noise(noise(1, 180.0, 5), 30.0);
+//! let mountains = Layer::ridges(noise(2, 500.0, 5), 110.0).terraced(14.0, 0.6).warped(noise(3, 150.0, 2), 40.0);
+//! let where_mountains_are = Layer::noise(noise(4, 1500.0, 2), 3.0).clamped(0.0, 1.0);
+//! let solid = Solid::Ground(60.0 + hills + mountains * where_mountains_are)
+//!     .subtraction(Caves { noise: noise(5, 60.0, 3), threshold: 0.3, lattice: 2 })
+//!     .subtraction(Tunnels { radius: 5.0, ..Tunnels::default() })
+//!     .union(Sdf::cuboid([0.0, 120.0, 0.0], [6.0, 80.0, 6.0]).with_material(4));
+//! let materials = vec![
+//!     MaterialRule::from(Stratum { material: 2, below_depth: 5.0, ..Stratum::default() }),
+//!     MaterialRule::from(Stratum { material: 2, steeper_than: 1.0, ..Stratum::default() }),
+//!     MaterialRule::from(Stratum { material: 3, above_height: 130.0, ..Stratum::default() }),
+//!     MaterialRule::from(Stratum { material: 1, ..Stratum::default() }).in_patches(noise(6, 40.0, 2), 0.2),
+//! ];
+//! let landscape = Landscape::new(LandscapeSettings { solid, materials })?;
+//! # assert!(landscape.height(0.0, 0.0).is_some());
+//! # }
+//! # Ok::<(), bevy_marchless::source::SourceError>(())
+//! ```
 //!
 //! Sources are floating point: they promise the same samples on the same machine and build, and nothing across
 //! machines.
@@ -32,6 +64,7 @@ mod height_map;
 mod interval;
 #[cfg(feature = "noise")]
 mod landscape;
+mod lipschitz;
 #[cfg(feature = "noise")]
 mod noise;
 #[cfg(feature = "noise")]
@@ -52,6 +85,7 @@ pub use fractal::Fractal;
 pub use height_map::{HeightMap, HeightMapError, HeightMapSettings};
 #[cfg(feature = "noise")]
 pub use landscape::{Caves, Landscape, LandscapeSettings, Layer, MaterialRule, Patches, Solid, Tunnels};
+pub use lipschitz::Lipschitz;
 pub use marchless::{Bound, Source, SourceRegion};
 #[cfg(feature = "noise")]
 pub use noise::{NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings};

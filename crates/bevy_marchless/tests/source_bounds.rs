@@ -198,22 +198,24 @@ fn distances_to_hills_are_nearly_true() {
     let noise = Fractal { zoom: 50.0, octaves: 4, ..Fractal::default() };
     let hills = NoiseHeights::new(NoiseHeightsSettings { noise, ..Default::default() }).expect("in range");
     let mut checked = 0;
-    for x in 0..40 {
+    for x in (0..40).step_by(2) {
         let height = hills.height(f64::from(x), 7.0);
+        let around: Vec<DVec3> = (-60..=60)
+            .flat_map(|dx| (-60..=60).map(move |dz| [f64::from(dx) * 0.1, f64::from(dz) * 0.1]))
+            .map(|[dx, dz]| DVec3::new(dx, hills.height(f64::from(x) + dx, 7.0 + dz), dz))
+            .collect();
         for y in (height as i32 - 3)..(height as i32 + 4) {
             let region = SourceRegion { min: [x, y, 7], size: [1; 3], level: 0, spacing: 1.0 };
             let distance = f64::from(filled(&hills, &region).0[0]);
-            let nearest = (-60..=60)
-                .flat_map(|dx| (-60..=60).map(move |dz| [f64::from(dx) * 0.1, f64::from(dz) * 0.1]))
-                .map(|[dx, dz]| DVec3::new(dx, hills.height(f64::from(x) + dx, 7.0 + dz) - f64::from(y), dz).length())
-                .fold(f64::INFINITY, f64::min);
+            let here = DVec3::new(0.0, f64::from(y), 0.0);
+            let nearest = around.iter().map(|ground| ground.distance(here)).fold(f64::INFINITY, f64::min);
             if nearest < 1.5 {
                 assert!((distance.abs() - nearest).abs() < 0.1 + 0.25 * nearest, "{distance} is {nearest}");
                 checked += 1;
             }
         }
     }
-    assert!(checked > 40, "only {checked} points lie near the surface");
+    assert!(checked > 20, "only {checked} points lie near the surface");
 }
 
 /// Along the vertical through a cave's wall, distances grow by about one voxel a voxel times the wall's tilt.
