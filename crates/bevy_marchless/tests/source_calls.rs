@@ -43,7 +43,6 @@ fn load(source: &dyn Source, checked: &dyn Source, calls: impl Fn() -> u64) -> A
         asked.filled += 1;
         let (mut distances, mut materials) = (vec![0.0; region.len()], vec![0; region.len()]);
         source.fill(&region, &mut distances, &mut materials);
-        asked.calls = calls();
         // The surface of a chunk lies in its cells, which reach to the first samples of the next chunks.
         let region = SourceRegion { size: region.size.map(|size| size + 1), ..region };
         let (mut distances, mut materials) = (vec![0.0; region.len()], vec![0; region.len()]);
@@ -51,6 +50,7 @@ fn load(source: &dyn Source, checked: &dyn Source, calls: impl Fn() -> u64) -> A
         let inside = distances.iter().filter(|distance| **distance < 0.0).count();
         asked.empty += u64::from(inside == 0 || inside == distances.len());
     }
+    asked.calls = calls();
     asked
 }
 
