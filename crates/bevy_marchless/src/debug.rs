@@ -83,10 +83,12 @@ fn measure(
 ) {
     let main_thread = main_thread.take();
     (stream.main_thread, stream.main_thread_last) = (stream.main_thread + main_thread, main_thread);
-    let drawn = || geometries.iter().filter(|geometry| !geometry.mesh.is_empty());
-    diagnostics.add_measurement(&DebugPlugin::CHUNKS, || drawn().count() as f64);
-    let triangles = || drawn().map(|geometry| geometry.mesh.triangle_count()).sum::<usize>();
-    diagnostics.add_measurement(&DebugPlugin::TRIANGLES, || triangles() as f64);
+    let (mut drawn, mut triangles, mut bytes) = (0u32, 0, 0);
+    for mesh in geometries.iter().map(|geometry| &geometry.mesh).filter(|mesh| !mesh.is_empty()) {
+        (drawn, triangles, bytes) = (drawn + 1, triangles + mesh.triangle_count(), bytes + geometry_bytes(mesh));
+    }
+    diagnostics.add_measurement(&DebugPlugin::CHUNKS, || f64::from(drawn));
+    diagnostics.add_measurement(&DebugPlugin::TRIANGLES, || triangles as f64);
     let unfilled = || volumes.iter().map(|volume| volume.unfilled).sum::<usize>();
     diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || unfilled() as f64);
     let unmeshed = || volumes.iter().map(TerrainVolume::waiting_for_meshes).sum::<usize>();
@@ -96,12 +98,10 @@ fn measure(
     let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
     diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(main_thread));
     if stats.update % 64 == 1 {
-        let samples: usize = volumes.iter().map(TerrainVolume::sample_bytes).sum();
-        let bytes = samples + drawn().map(|geometry| geometry_bytes(&geometry.mesh)).sum::<usize>();
+        bytes += volumes.iter().map(TerrainVolume::sample_bytes).sum::<usize>();
         diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes as f64);
-        let count = drawn().count();
-        if count > 0 {
-            diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes as f64 / count as f64);
+        if drawn > 0 {
+            diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes as f64 / f64::from(drawn));
         }
     }
     let meshed = core::mem::take(&mut stats.meshed);
