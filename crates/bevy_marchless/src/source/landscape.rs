@@ -38,7 +38,7 @@ const MOST_NESTED: u32 = 32;
 pub struct LandscapeSettings {
     /// What is ground. Default: hills, those of [`NoiseHeights`](super::NoiseHeights).
     pub solid: Solid,
-    /// What the ground is made of; shapes have materials of their own. [Default: material 2 from 5 units of depth and
+    /// What the ground is made of; shapes have materials of their own. [Default: material 2 from 3.5 units of depth and
     /// where it is steeper than 1, material 1 from 1.5 units of depth, and 0 on top]
     pub materials: Vec<MaterialRule>,
 }

@@ -21,7 +21,7 @@ pub struct NoiseHeightsSettings {
     pub base: f64,
     /// How far heights reach above and below the base at most. Units: world. Limit: >= 0. Default: 52.
     pub amplitude: f64,
-    /// The ground's materials. [Default: material 2 from 5 units of depth and where it is steeper than 1, material 1
+    /// The ground's materials. [Default: material 2 from 3.5 units of depth and where it is steeper than 1, material 1
     /// from 1.5 units of depth, and 0 on top]
     pub strata: Vec<Stratum>,
 }
@@ -47,7 +47,7 @@ impl NoiseHeightsSettings {
 
 pub(crate) fn default_strata() -> Vec<Stratum> {
     vec![
-        Stratum { material: 2, below_depth: 5.0, ..Stratum::default() },
+        Stratum { material: 2, below_depth: 3.5, ..Stratum::default() },
         Stratum { material: 2, steeper_than: 1.0, ..Stratum::default() },
         Stratum { material: 1, below_depth: 1.5, ..Stratum::default() },
     ]
