@@ -44,9 +44,12 @@
 //! - With Bevy's `RenderAssetBytesPerFrame` below what a group needs, its meshes may reach the screen frames apart.
 //!
 //! # Features
-//! `pbr` (materials), `gizmos` (bounds of chunks), `noise` and `png` (sources); all are on by default. Without them, and
-//! without any renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)). `big_space`, off by default,
-//! puts chunks into the cells of a `big_space` grid, for worlds of any size.
+//! On by default: `pbr` (materials), `gizmos` (bounds of chunks), `noise` and `png` (sources). Without them, and without any
+//! renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
+//!
+//! Off by default: `big_space` puts chunks into the cells of a `big_space` grid, for worlds of any size. `serde` lets
+//! settings be written and read. `world_files`, which includes it, has terrains follow files in `assets`, also while the
+//! game runs (module `world`).
 
 #[cfg(feature = "big_space")]
 pub mod big_space;
@@ -65,6 +68,8 @@ mod stats;
 pub mod stream;
 pub mod terrain;
 mod work;
+#[cfg(feature = "world_files")]
+pub mod world;
 
 use bevy_app::plugin_group;
 
@@ -87,6 +92,8 @@ pub mod prelude {
     pub use crate::source::*;
     pub use crate::stream::{Coverage, Leaf, LeafState, StreamStats, TerrainViewer};
     pub use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainError, TerrainVolume};
+    #[cfg(feature = "world_files")]
+    pub use crate::world::{TerrainWorld, WorldDescription, WorldSource};
     pub use marchless::Region;
     pub use marchless::bits::BitGrid;
 }
@@ -103,6 +110,8 @@ plugin_group! {
         material:::MaterialPlugin,
         #[cfg(feature = "big_space")]
         big_space:::BigSpacePlugin,
+        #[cfg(feature = "world_files")]
+        world:::WorldPlugin,
         debug:::DebugPlugin,
     }
 }

@@ -42,6 +42,7 @@ pub(crate) use range::Wanted;
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default, Debug, PartialEq, Clone)]
 #[require(Transform)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct TerrainViewer {
     /// How far it sees along the terrain's axes, in voxels: half the axes of an ellipsoid. Above 0. Default 256, 128, 256.
     pub radii: Vec3,

@@ -301,6 +301,7 @@ impl PartialEq for SourceHandle {
 /// The colours of materials, in order of their numbers. With fewer than 256 they repeat; with none, all is white.
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[reflect(Default, Debug, PartialEq, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Palette {
     /// One a material.
     pub colors: Vec<Color>,

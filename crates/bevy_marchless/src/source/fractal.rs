@@ -9,6 +9,7 @@ use super::{SourceError, check, check_length};
 /// −0.5 and 0.5.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Fractal {
     /// Another seed, another world.
     pub seed: u32,

@@ -20,6 +20,7 @@ use super::{SourceError, check, check_length, check_position};
 /// How a picture's pixels become ground. One metre is one world unit.
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct HeightMapSettings {
     /// Metres per pixel along x (a row of the picture) and z (a column). Limit: > 0. Default: 1, 1.
     pub metres_per_pixel: DVec2,
@@ -44,7 +45,7 @@ impl Default for HeightMapSettings {
 ///
 /// The picture's left edge lies at x = 0, its top edge at z = 0; each sample stands in the middle of its pixel, and
 /// beyond the picture the heights of its border go on. So north is −z where it is the picture's top.
-#[derive(Clone, Reflect)]
+#[derive(Clone, PartialEq, Reflect)]
 #[reflect(opaque)]
 pub struct HeightMap {
     size: [u32; 2],

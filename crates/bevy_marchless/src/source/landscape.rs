@@ -35,6 +35,7 @@ const MOST_NESTED: u32 = 32;
 /// What a [`Landscape`] is made of: plain data, to be kept in files and changed in editors.
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct LandscapeSettings {
     /// What is ground. Default: hills, those of [`NoiseHeights`](super::NoiseHeights).
     pub solid: Solid,

@@ -13,6 +13,7 @@ use super::{
 /// What [`NoiseHeights`] are made of.
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct NoiseHeightsSettings {
     /// The noise; its `zoom` is about the distance between hills.
     pub noise: Fractal,
@@ -134,6 +135,7 @@ impl Source for NoiseHeights {
 /// What a [`NoiseDensity`] is made of.
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct NoiseDensitySettings {
     /// The noise; its `zoom` is about the distance between caves.
     pub noise: Fractal,

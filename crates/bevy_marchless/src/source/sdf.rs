@@ -26,6 +26,7 @@ use super::{ROOM, SourceError, check, check_length, check_position, rows, world_
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(no_field_bounds)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub enum Sdf {
     /// A ball.
     Sphere {
@@ -34,6 +35,7 @@ pub enum Sdf {
         /// How far it reaches. Limit: > 0.
         radius: f64,
         /// What it is made of.
+        #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
     /// A box along the axes.
@@ -43,6 +45,7 @@ pub enum Sdf {
         /// From the middle to its faces. Limit: > 0.
         half_size: DVec3,
         /// What it is made of.
+        #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
     /// All points near a line: a rod with round ends.
@@ -54,6 +57,7 @@ pub enum Sdf {
         /// How far from the line it reaches. Limit: > 0.
         radius: f64,
         /// What it is made of.
+        #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
     /// A ring that lies flat, around the y axis.
@@ -65,6 +69,7 @@ pub enum Sdf {
         /// The tube's radius. Limit: > 0.
         minor: f64,
         /// What it is made of.
+        #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
     /// Everything on one side of a plane.
@@ -74,6 +79,7 @@ pub enum Sdf {
         /// Away from the solid side. Limit: length 1.
         normal: DVec3,
         /// What it is made of.
+        #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
     /// Whatever lies in any part; where parts overlap, the material of the one that reaches out farthest.

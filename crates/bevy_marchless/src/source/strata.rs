@@ -21,6 +21,7 @@ use bevy_reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Stratum {
     /// What the ground is made of here.
     pub material: u8,

@@ -19,6 +19,7 @@ use marchless::Region;
 /// ```
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, PartialEq, Hash, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Ends", into = "Ends"))]
 pub struct Extent {
     /// The lowest chunk.
     pub min: IVec3,
@@ -83,9 +84,39 @@ impl From<UVec3> for Extent {
     }
 }
 
+/// An extent as files have it: the first chunk and one past the last, for the axes along which it ends.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize, Default)]
+#[serde(rename = "Extent", default, deny_unknown_fields)]
+struct Ends {
+    x: Option<(i32, i32)>,
+    y: Option<(i32, i32)>,
+    z: Option<(i32, i32)>,
+}
+
+#[cfg(feature = "serde")]
+impl From<Ends> for Extent {
+    fn from(ends: Ends) -> Self {
+        let ends = [ends.x, ends.y, ends.z].map(|ends| ends.unwrap_or((i32::MIN, i32::MAX)));
+        Self { min: ends.map(|(first, _)| first).into(), max: ends.map(|(_, end)| end).into() }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Extent> for Ends {
+    fn from(extent: Extent) -> Self {
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let ends = (extent.min[axis], extent.max[axis]);
+            (ends != (i32::MIN, i32::MAX)).then_some(ends)
+        });
+        Self { x, y, z }
+    }
+}
+
 /// Which chunks of a terrain are loaded whether a [`TerrainViewer`](crate::stream::TerrainViewer) is near or not.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, PartialEq, Hash, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Keep {
     /// All of them; their number is limited by [`Terrain::MAX_CHUNKS`](super::Terrain::MAX_CHUNKS).
     #[default]

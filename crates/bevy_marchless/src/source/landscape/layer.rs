@@ -27,6 +27,7 @@ use crate::source::{FARTHEST, Fractal, SourceError, check, check_length, check_p
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default, no_field_bounds)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub enum Layer {
     /// The same everywhere.
     Constant(f64),

@@ -26,6 +26,7 @@ use crate::source::{Fractal, SourceError, Stratum, check};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MaterialRule {
     /// The material, and the depth, height and slope where it is.
     pub stratum: Stratum,
@@ -37,6 +38,7 @@ pub struct MaterialRule {
 /// rule with patches decides, and ground of unsure material is never skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Patches {
     /// The noise; its `zoom` is about the distance between patches. Default: as of [`Fractal`].
     pub noise: Fractal,

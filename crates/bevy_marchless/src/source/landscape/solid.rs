@@ -22,6 +22,7 @@ use crate::source::{Fractal, Sdf, SourceError, check, check_length};
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default, no_field_bounds)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub enum Solid {
     /// All of space.
     Everything,
@@ -44,6 +45,7 @@ pub enum Solid {
 /// Where 3-D noise is above a threshold: rooms and passages when subtracted, islands and overhangs when not.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Caves {
     /// The noise; its `zoom` is about the distance between caves. Default: 3 octaves, a zoom of 40.
     pub noise: Fractal,
@@ -76,6 +78,7 @@ impl Caves {
 /// Winding tubes: everything near the lines along which two 3-D noises are 0.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Tunnels {
     /// One noise; the other is the same with another seed. Default: 2 octaves, a zoom of 90.
     pub noise: Fractal,

@@ -1,0 +1,201 @@
+//! [`WorldDescription`]: what a world is made of, as plain data.
+
+use bevy_asset::Asset;
+use bevy_reflect::prelude::*;
+use ron::Options;
+use ron::extensions::Extensions;
+use ron::ser::PrettyConfig;
+use serde::{Deserialize, Serialize};
+
+use super::WorldError;
+use crate::source::{Air, Sdf};
+#[cfg(feature = "png")]
+use crate::source::{HeightMap, HeightMapSettings};
+#[cfg(feature = "noise")]
+use crate::source::{
+    Landscape, LandscapeSettings, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings,
+};
+use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain};
+
+/// What a world is made of: plain data, read from a file or written in code, kept as an asset.
+#[derive(Asset, Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
+#[reflect(Debug, PartialEq, Clone)]
+#[serde(deny_unknown_fields)]
+pub struct WorldDescription {
+    /// What it is made of before it is edited. A file must name it.
+    pub source: WorldSource,
+    /// As of [`Terrain::palette`]. Default: as of [`Palette`].
+    #[serde(default)]
+    pub palette: Palette,
+    /// As of [`Terrain::voxel_size`]. Default: 1.
+    #[serde(default = "default_voxel_size")]
+    pub voxel_size: f32,
+    /// As of [`Terrain::extent`]. Default: as of [`Terrain`], 8 × 4 × 8 chunks.
+    #[serde(default = "default_extent")]
+    pub extent: Extent,
+    /// As of [`Terrain::keep`]; an extent without end needs another than the default. Default: everything.
+    #[serde(default)]
+    pub keep: Keep,
+}
+
+/// What a world is made of before it is edited.
+#[derive(Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
+#[reflect(Debug, PartialEq, Clone)]
+#[non_exhaustive]
+pub enum WorldSource {
+    /// [`Air`].
+    Air,
+    /// [`NoiseHeights`].
+    #[cfg(feature = "noise")]
+    NoiseHeights(NoiseHeightsSettings),
+    /// [`NoiseDensity`].
+    #[cfg(feature = "noise")]
+    NoiseDensity(NoiseDensitySettings),
+    /// [`Landscape`].
+    #[cfg(feature = "noise")]
+    Landscape(LandscapeSettings),
+    /// An [`Sdf`].
+    Sdf(Sdf),
+    /// A [`HeightMap`].
+    #[cfg(feature = "png")]
+    HeightMap(WorldHeightMap),
+}
+
+/// A height map of a world: which picture it is, and how its pixels become ground.
+#[cfg(feature = "png")]
+#[derive(Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
+#[reflect(Debug, PartialEq, Clone)]
+#[serde(deny_unknown_fields)]
+pub struct WorldHeightMap {
+    /// Where the picture is, a 16-bit greyscale PNG file: a path in `assets`, as the asset server takes it. When that
+    /// file changes, the world is loaded again.
+    pub picture: String,
+    /// How its pixels become ground.
+    #[serde(default)]
+    pub settings: HeightMapSettings,
+    /// The picture's samples; not written to files. The asset loader reads them; in code, set them.
+    #[serde(skip)]
+    pub map: Option<HeightMap>,
+}
+
+impl WorldDescription {
+    /// A world made of `source`, else as the defaults.
+    pub fn new(source: WorldSource) -> Self {
+        Self {
+            source,
+            palette: Palette::default(),
+            voxel_size: default_voxel_size(),
+            extent: default_extent(),
+            keep: Keep::default(),
+        }
+    }
+
+    /// The world that a file's text describes. Pictures are not read yet.
+    ///
+    /// # Errors
+    /// [`WorldError`] for text that is cut short, is no such RON, or holds settings that are out of range.
+    pub fn from_ron(text: &str) -> Result<Self, WorldError> {
+        let world: Self = options().from_str(text).map_err(|error| WorldError::from_ron(error, text))?;
+        world.check().map_err(|error| error.in_text(text))?;
+        Ok(world)
+    }
+
+    /// The same of a file's bytes.
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, WorldError> {
+        let text = str::from_utf8(bytes).map_err(|error| {
+            let valid = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+            WorldError::from_utf8(&valid, error.error_len().is_none())
+        })?;
+        Self::from_ron(text)
+    }
+
+    /// The text of a file that describes this world.
+    ///
+    /// # Errors
+    /// [`WorldError::Write`] for what is nested too deeply.
+    pub fn to_ron(&self) -> Result<String, WorldError> {
+        let pretty = PrettyConfig::new();
+        options().to_string_pretty(self, pretty).map_err(|error| WorldError::Write { message: error.to_string() })
+    }
+
+    /// A terrain of this world.
+    ///
+    /// # Errors
+    /// [`WorldError`] for settings that are out of range and for a height map whose picture was not read.
+    pub fn terrain(&self) -> Result<Terrain, WorldError> {
+        let mut terrain = Terrain::default();
+        self.apply(None, &mut terrain)?;
+        Ok(terrain)
+    }
+
+    /// Gives a terrain what differs from the world that it had `before`. Where there is an error, the terrain stays.
+    pub(super) fn apply(&self, before: Option<&Self>, terrain: &mut Terrain) -> Result<(), WorldError> {
+        let mut next = terrain.clone();
+        if before.is_none_or(|before| before.source != self.source) {
+            next.source = self.source.build()?;
+        }
+        if before.is_none_or(|before| before.palette != self.palette) {
+            next.palette = self.palette.clone();
+        }
+        if before.is_none_or(|before| before.voxel_size != self.voxel_size) {
+            next.voxel_size = self.voxel_size;
+        }
+        if before.is_none_or(|before| before.extent != self.extent) {
+            next.extent = self.extent;
+        }
+        if before.is_none_or(|before| before.keep != self.keep) {
+            next.keep = self.keep;
+        }
+        next.check()?;
+        *terrain = next;
+        Ok(())
+    }
+
+    /// Whether all settings are in their ranges; a picture may still be missing.
+    fn check(&self) -> Result<(), WorldError> {
+        match self.terrain() {
+            #[cfg(feature = "png")]
+            Err(WorldError::NoPicture { .. }) => {
+                Self { source: WorldSource::Air, ..self.clone() }.terrain().map(|_| ())
+            }
+            other => other.map(|_| ()),
+        }
+    }
+}
+
+impl WorldSource {
+    /// The source itself.
+    ///
+    /// # Errors
+    /// [`WorldError`] for settings that are out of range and for a height map whose picture was not read.
+    pub fn build(&self) -> Result<SourceHandle, WorldError> {
+        Ok(match self.clone() {
+            Self::Air => SourceHandle::new(Air),
+            #[cfg(feature = "noise")]
+            Self::NoiseHeights(settings) => SourceHandle::new(NoiseHeights::new(settings)?),
+            #[cfg(feature = "noise")]
+            Self::NoiseDensity(settings) => SourceHandle::new(NoiseDensity::new(settings)?),
+            #[cfg(feature = "noise")]
+            Self::Landscape(settings) => SourceHandle::new(Landscape::new(settings)?),
+            Self::Sdf(shape) => SourceHandle::new(shape.validate()?),
+            #[cfg(feature = "png")]
+            Self::HeightMap(WorldHeightMap { picture, settings, map }) => {
+                let map = map.ok_or(WorldError::NoPicture { picture })?;
+                SourceHandle::new(map.with_settings(settings)?)
+            }
+        })
+    }
+}
+
+fn default_voxel_size() -> f32 {
+    Terrain::default().voxel_size
+}
+
+fn default_extent() -> Extent {
+    Terrain::default().extent
+}
+
+/// What makes files shorter to write.
+fn options() -> Options {
+    Options::default().with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
+}

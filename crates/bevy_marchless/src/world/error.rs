@@ -1,0 +1,192 @@
+//! [`WorldError`]: what is wrong with a world, and where.
+
+use std::io;
+
+use ron::error::{Error as RonError, SpannedError};
+use thiserror::Error;
+
+use crate::source::SourceError;
+use crate::terrain::TerrainError;
+
+/// Why a world cannot be made, or its file not be read. Lines and columns count from 1.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WorldError {
+    /// The file's bytes could not be read.
+    #[error("the world file cannot be read: {0}")]
+    Read(#[from] io::Error),
+    /// The text ends before the world does.
+    #[error("the world file is cut short: it ends in line {line}, column {column}, in the middle of the world")]
+    CutShort {
+        /// The last line.
+        line: usize,
+        /// One past its end.
+        column: usize,
+    },
+    /// The file is no text.
+    #[error("a world file must be UTF-8 text, but there are other bytes in line {line}")]
+    NotText {
+        /// Where they begin.
+        line: usize,
+    },
+    /// The text is no RON, or does not describe a world: unknown or missing fields, values of wrong types.
+    #[error("line {line}, column {column}: {message}")]
+    Text {
+        /// Where it is.
+        line: usize,
+        /// Where it is.
+        column: usize,
+        /// What was expected and what came.
+        message: String,
+    },
+    /// A setting of the source is out of range.
+    #[error("{}{error}", in_lines(lines))]
+    Source {
+        /// Which, and what is allowed.
+        error: SourceError,
+        /// The lines in which such a number stands: one of them is wrong. Empty where there is no file.
+        lines: Vec<usize>,
+    },
+    /// A setting of the terrain is out of range.
+    #[error("{}{error}", in_lines(lines))]
+    Terrain {
+        /// Which, and what is allowed.
+        error: TerrainError,
+        /// The lines in which such a number stands: one of them is wrong. Empty where there is no file.
+        lines: Vec<usize>,
+    },
+    /// A height map's picture could not be read.
+    #[error("the picture '{picture}' cannot be used: {message}")]
+    Picture {
+        /// Its path in `assets`.
+        picture: String,
+        /// Why.
+        message: String,
+    },
+    /// A height map without samples: worlds made in code bring them, only files have them read.
+    #[error("the picture '{picture}' has not been read")]
+    NoPicture {
+        /// Its path in `assets`.
+        picture: String,
+    },
+    /// A world that cannot be written.
+    #[error("the world cannot be written: {message}")]
+    Write {
+        /// Why.
+        message: String,
+    },
+}
+
+impl From<SourceError> for WorldError {
+    fn from(error: SourceError) -> Self {
+        Self::Source { error, lines: Vec::new() }
+    }
+}
+
+impl From<TerrainError> for WorldError {
+    fn from(error: TerrainError) -> Self {
+        Self::Terrain { error, lines: Vec::new() }
+    }
+}
+
+impl WorldError {
+    /// Bytes that are not text: after `valid` bytes that are, or cut off within a character.
+    pub(super) fn from_utf8(valid: &str, cut_off: bool) -> Self {
+        if cut_off { Self::cut_short(valid) } else { Self::NotText { line: valid.matches('\n').count() + 1 } }
+    }
+
+    /// What the parser says about a text.
+    pub(super) fn from_ron(error: SpannedError, text: &str) -> Self {
+        let (start, end) = (error.span.start, error.span.end);
+        let rest = after(text, start.line, start.col).trim();
+        let at_end = after(text, end.line, end.col).trim().is_empty();
+        let in_last_word = !rest.contains(|c: char| !is_of_word(c));
+        let text_error = |message: String| {
+            let (line, column) = place(text, text.len() - after(text, start.line, start.col).trim_start().len());
+            Self::Text { line, column, message }
+        };
+        match error.code {
+            RonError::Eof | RonError::ExpectedStringEnd | RonError::UnclosedBlockComment => Self::cut_short(text),
+            RonError::TrailingCharacters => text_error("there is text after the world's end".into()),
+            _ if at_end || in_last_word => Self::cut_short(text),
+            code => text_error(code.to_string()),
+        }
+    }
+
+    /// The same about a file of this text: with the lines in which the number stands.
+    pub(super) fn in_text(self, text: &str) -> Self {
+        match self {
+            Self::Source { error, .. } => {
+                let lines = match &error {
+                    SourceError::Setting { found, .. } => lines_with(text, *found),
+                    _ => Vec::new(),
+                };
+                Self::Source { error, lines }
+            }
+            Self::Terrain { error, .. } => {
+                let lines = match &error {
+                    TerrainError::VoxelSize { found } => lines_with(text, f64::from(*found)),
+                    _ => Vec::new(),
+                };
+                Self::Terrain { error, lines }
+            }
+            other => other,
+        }
+    }
+
+    fn cut_short(text: &str) -> Self {
+        let (line, column) = place(text, text.trim_end().len());
+        Self::CutShort { line, column }
+    }
+}
+
+/// The text from a line and column on, both counted from 1.
+fn after(text: &str, line: usize, column: usize) -> &str {
+    let lines: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+    let rest = &text[lines..];
+    let columns: usize = rest.chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
+    &rest[columns..]
+}
+
+/// The line and column, counted from 1, of the byte at `offset`.
+fn place(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text[..offset];
+    let last = before.rsplit('\n').next().unwrap_or("");
+    (before.matches('\n').count() + 1, last.chars().count() + 1)
+}
+
+/// Whether names and numbers have such characters.
+fn is_of_word(c: char) -> bool {
+    c.is_alphanumeric() || "+-._".contains(c)
+}
+
+/// The lines, counted from 1, in which a number stands, comments left aside.
+fn lines_with(text: &str, number: f64) -> Vec<usize> {
+    let is_it = |word: &str| {
+        let same =
+            |found: f64| found == number || f64::from(found as f32) == number || (found.is_nan() && number.is_nan());
+        word.replace('_', "").parse().is_ok_and(same)
+    };
+    let lines = (1..).zip(text.lines().map(|line| line.split("//").next().unwrap_or("")));
+    lines.filter(|(_, line)| line.split(|c| !is_of_word(c)).any(is_it)).map(|(line, _)| line).collect()
+}
+
+fn in_lines(lines: &[usize]) -> String {
+    let lines: Vec<_> = lines.iter().map(usize::to_string).collect();
+    if lines.is_empty() { String::new() } else { format!("line {}: ", lines.join(" or ")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_found_where_it_stands() {
+        let text = "(a: 3.5,\n b: [-3.5, 1_000], // 2\n c: -0.35e1,\n d: 0.1)";
+        assert_eq!(lines_with(text, -3.5), [2, 3]);
+        assert_eq!(lines_with(text, 1000.0), [2]);
+        assert_eq!(lines_with(text, 2.0), []);
+        assert_eq!(lines_with(text, f64::from(0.1_f32)), [4]);
+        assert_eq!(in_lines(&[2, 3]), "line 2 or 3: ");
+    }
+}

@@ -1,0 +1,85 @@
+//! Lets terrains follow the worlds that they are to be.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use bevy_asset::{AssetEvent, AssetId, AssetLoadError, AssetServer, Assets, LoadState};
+use bevy_ecs::prelude::*;
+
+use super::{TerrainWorld, WorldDescription, WorldError};
+use crate::terrain::Terrain;
+
+/// The world that a terrain was made last.
+#[derive(Component, Default)]
+pub(super) struct Followed(Option<WorldDescription>);
+
+/// Gives terrains what has changed in their worlds.
+pub(super) fn follow_worlds(
+    mut terrains: Query<(Entity, Ref<TerrainWorld>, &mut Terrain, &mut Followed)>,
+    worlds: Res<Assets<WorldDescription>>,
+    mut events: MessageReader<AssetEvent<WorldDescription>>,
+) {
+    let changed: HashSet<_> = events
+        .read()
+        .filter_map(|event| match event {
+            AssetEvent::Added { id } | AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    for (entity, handle, mut terrain, mut followed) in &mut terrains {
+        if !handle.is_changed() && !changed.contains(&handle.0.id()) {
+            continue;
+        }
+        let Some(world) = worlds.get(&handle.0).filter(|world| followed.0.as_ref() != Some(*world)) else { continue };
+        // Only what is applied counts as a change of the terrain.
+        let mut next = terrain.clone();
+        match world.apply(followed.0.as_ref(), &mut next) {
+            Ok(()) => {
+                *terrain = next;
+                followed.0 = Some(world.clone());
+            }
+            Err(error) => bevy_log::warn!("terrain {entity}: its world is not applied, and it stays as it is: {error}"),
+        }
+    }
+}
+
+/// Tells once of each world file that could not be loaded.
+pub(super) fn report_failures(
+    terrains: Query<&TerrainWorld>,
+    server: Res<AssetServer>,
+    mut reported: Local<HashMap<AssetId<WorldDescription>, (Arc<AssetLoadError>, String)>>,
+) {
+    let used: HashSet<_> = terrains.iter().map(|world| world.0.id()).collect();
+    reported.retain(|id, _| used.contains(id));
+    for id in used {
+        match server.load_state(id) {
+            LoadState::Failed(error) => {
+                let before = reported.get(&id);
+                if before.is_some_and(|(before, _)| Arc::ptr_eq(before, &error)) {
+                    continue;
+                }
+                // A reload may try twice, and fail twice in the same way.
+                let text = describe(&error);
+                if before.is_none_or(|(_, before)| *before != text) {
+                    bevy_log::warn!("terrains stay as they are, since their {text}");
+                }
+                reported.insert(id, (error, text));
+            }
+            LoadState::Loaded => {
+                reported.remove(&id);
+            }
+            LoadState::NotLoaded | LoadState::Loading => {}
+        }
+    }
+}
+
+/// The file and what is wrong with it, in one line, without a backtrace.
+fn describe(error: &AssetLoadError) -> String {
+    if let AssetLoadError::AssetLoaderError(loading) = error
+        && let Some(error) = loading.error().downcast_ref::<WorldError>()
+    {
+        return format!("world '{}' cannot be loaded: {error}", loading.path());
+    }
+    let text = error.to_string();
+    format!("world cannot be loaded: {}", text.lines().next().unwrap_or(""))
+}

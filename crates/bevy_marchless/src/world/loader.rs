@@ -1,0 +1,56 @@
+//! Reads world files, and the pictures that they name.
+
+use bevy_asset::io::Reader;
+use bevy_asset::{AssetLoader, LoadContext};
+use bevy_reflect::TypePath;
+
+#[cfg(feature = "png")]
+use super::WorldSource;
+use super::{WorldDescription, WorldError};
+#[cfg(feature = "png")]
+use crate::source::{HeightMap, HeightMapSettings};
+
+/// Loads a [`WorldDescription`] from `*.world.ron`.
+#[derive(Clone, Copy, Debug, Default, TypePath)]
+pub struct WorldLoader;
+
+impl AssetLoader for WorldLoader {
+    type Asset = WorldDescription;
+    type Settings = ();
+    type Error = WorldError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        (): &(),
+        context: &mut LoadContext<'_>,
+    ) -> Result<WorldDescription, WorldError> {
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).await?;
+        let mut world = WorldDescription::from_bytes(&bytes)?;
+        read_picture(&mut world, context).await?;
+        Ok(world)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["world.ron"]
+    }
+}
+
+/// Reads the picture of a height map, and so makes the world depend on it.
+#[cfg(feature = "png")]
+async fn read_picture(world: &mut WorldDescription, context: &mut LoadContext<'_>) -> Result<(), WorldError> {
+    if let WorldSource::HeightMap(height_map) = &mut world.source {
+        let failed = |message: String| WorldError::Picture { picture: height_map.picture.clone(), message };
+        let bytes = context.read_asset_bytes(&height_map.picture).await.map_err(|error| failed(error.to_string()))?;
+        let map = HeightMap::from_bytes(&bytes, HeightMapSettings::default());
+        height_map.map = Some(map.map_err(|error| failed(error.to_string()))?);
+        world.source.build()?;
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "png"))]
+async fn read_picture(_world: &mut WorldDescription, _context: &mut LoadContext<'_>) -> Result<(), WorldError> {
+    Ok(())
+}
