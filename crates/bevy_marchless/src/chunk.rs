@@ -50,7 +50,7 @@ impl ChunkKey {
 
 /// What a chunk looks like at the moment: the mesh in voxels from the chunk's lowest corner, without any renderer.
 ///
-/// Empty where nothing is drawn. The same entity's `Mesh3d` holds the same mesh, where there are `Assets<Mesh>`.
+/// Empty where nothing is left to draw: all was dug away. The same entity's `Mesh3d` holds the same mesh, where there are `Assets<Mesh>`.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Debug, Clone)]
 #[component(immutable)]

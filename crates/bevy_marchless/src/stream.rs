@@ -135,9 +135,9 @@ pub struct StreamStats {
     pub bounded: u64,
     /// Chunks that took sampling.
     pub filled: u64,
-    /// Those of them that have no surface: all of their own samples and of the layers around them lie on one side.
+    /// Those of them that proved empty: all of their own samples lie on one side of the surface.
     pub filled_empty: u64,
-    /// Chunks that were meshed, again after edits included.
+    /// Chunks that were meshed, again after edits included; not those that are known to have no surface.
     pub meshed: u64,
     /// How long jobs have sampled and bounded, in all.
     pub fill_time: Duration,
