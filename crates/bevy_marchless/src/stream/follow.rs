@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use bevy_math::DAffine3;
+use bevy_math::{DAffine3, Vec3};
 use bevy_platform::collections::{HashMap, HashSet};
 use bevy_platform::time::Instant;
 use bevy_tasks::AsyncComputeTaskPool;
@@ -223,7 +223,8 @@ impl Look<'_> {
         let position = place.translation();
         let at = to_terrain.transform_point3(position.as_dvec3()) / (f64::from(self.terrain.voxel_size) * cells);
         let at = at.to_array();
-        let radii = settings.radii.as_dvec3().to_array().map(|v| v.min(FARTHEST) / cells);
+        // Not `min`, which would make a number of what is none.
+        let radii = settings.radii.as_dvec3().to_array().map(|v| if v > FARTHEST { FARTHEST } else { v } / cells);
         let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
         if !at.iter().all(|v| v.is_finite()) {
             self.warn(viewer, || {
@@ -257,11 +258,15 @@ impl Look<'_> {
                 )
             });
         }
-        let samples = samples.is_finite().then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
+        let margin = limited_margin(&range, margin);
+        // Where all that may be loaded lies within, none are dropped.
+        let drops = samples < range.longest() + margin + 2.0;
+        let samples = drops.then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
         // In steps, so that looking around changes little.
-        let forward = to_terrain.transform_vector3(place.forward().as_dvec3()).normalize_or_zero();
+        let forward = place.affine().transform_vector3(Vec3::NEG_Z).as_dvec3();
+        let forward = to_terrain.transform_vector3(forward).normalize_or_zero();
         let forward = (forward * 2.0).round().to_array();
-        Some(Viewed { range, margin: margin.min(1e6), samples, forward })
+        Some(Viewed { range, margin, samples, forward })
     }
 
     fn warn(&mut self, about: Entity, text: impl FnOnce() -> String) {
@@ -281,6 +286,15 @@ fn limited(mut range: Range) -> Range {
         range = range.shrunk(0.97);
     }
     range
+}
+
+/// The margin, made smaller until the range with it has no more than a few times the chunks that may be loaded.
+fn limited_margin(range: &Range, margin: f64) -> f64 {
+    let mut margin = margin.min(FARTHEST);
+    while margin > 0.1 && range.widened(margin).box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
+        margin *= 0.9;
+    }
+    margin
 }
 
 /// Letting the chunks of one terrain follow.

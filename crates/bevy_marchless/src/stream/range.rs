@@ -46,6 +46,11 @@ impl Range {
         if self.is_box { self } else { Self { radii: self.radii.map(|radius| radius + chunks), ..self } }
     }
 
+    /// Half of the longest axis, in chunks.
+    pub(crate) fn longest(&self) -> f64 {
+        self.radii.into_iter().fold(0.0, f64::max)
+    }
+
     /// How many chunks the box around it has, or a little more.
     pub(crate) fn box_size(&self) -> f64 {
         let size = self.extent.size();
@@ -61,7 +66,7 @@ impl Range {
     /// The square of how far a chunk is from the middle, in chunks, where half the ellipsoid's axes are equal; with other
     /// axes, scaled to the longest.
     pub(crate) fn squared_distance(&self, position: [i32; 3]) -> f64 {
-        let longest = self.radii.into_iter().fold(0.0, f64::max);
+        let longest = self.longest();
         (0..3)
             .map(|axis| {
                 let offset = f64::from(position[axis]) + 0.5 - self.middle[axis];

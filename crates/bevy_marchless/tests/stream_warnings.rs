@@ -1,0 +1,89 @@
+//! What is wrong is said once, in a sentence, and not in every update.
+
+mod common;
+
+use std::sync::Mutex;
+use std::time::Duration;
+
+use bevy_app::App;
+use bevy_ecs::prelude::*;
+use bevy_log::tracing::field::{Field, Visit};
+use bevy_log::tracing::{self, Event, Level, Subscriber};
+use bevy_log::tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
+use bevy_marchless::prelude::*;
+use bevy_math::Vec3;
+use bevy_transform::components::Transform;
+use common::stream::*;
+use common::*;
+
+/// The plugin's warnings and errors.
+static LOG: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+struct Recorder;
+
+impl<S: Subscriber> Layer<S> for Recorder {
+    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
+        let ours = event.metadata().target().starts_with("bevy_marchless");
+        if ours && *event.metadata().level() <= Level::WARN {
+            let mut message = Message::default();
+            event.record(&mut message);
+            LOG.lock().unwrap().push(message.0);
+        }
+    }
+}
+
+#[derive(Default)]
+struct Message(String);
+
+impl Visit for Message {
+    fn record_debug(&mut self, field: &Field, value: &dyn core::fmt::Debug) {
+        if field.name() == "message" {
+            self.0 = format!("{value:?}");
+        }
+    }
+}
+
+/// Sets a world up, updates it 100 times while all is well and 100 times after a change, and returns what was said.
+fn said(terrain: Terrain, change: impl Fn(&mut App, Entity, Entity)) -> Vec<String> {
+    let mut app = app_with_budget(16);
+    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_millis(1);
+    let terrain = app.world_mut().spawn(terrain.with_chunk_cells(8)).id();
+    let viewer = app.world_mut().spawn(TerrainViewer::new(12.0)).id();
+    for _ in 0..100 {
+        app.update();
+    }
+    change(&mut app, terrain, viewer);
+    for _ in 0..100 {
+        app.update();
+    }
+    core::mem::take(&mut LOG.lock().unwrap())
+}
+
+fn place(app: &mut App, entity: Entity, change: impl Fn(&mut Transform)) {
+    change(&mut app.world_mut().get_mut::<Transform>(entity).unwrap());
+}
+
+fn see(app: &mut App, viewer: Entity, radius: f32) {
+    app.world_mut().get_mut::<TerrainViewer>(viewer).unwrap().radii = Vec3::splat(radius);
+}
+
+/// One test, since a process has one log.
+#[test]
+fn each_fault_is_reported_once() {
+    let log = bevy_log::tracing_subscriber::registry().with(Recorder);
+    tracing::subscriber::set_global_default(log).expect("no other log");
+    let hills = || Terrain::endless(Hills::default());
+
+    assert_eq!(said(hills(), |_, _, _| ()), [""; 0], "nothing is wrong");
+    let nowhere = said(hills(), |app, _, viewer| place(app, viewer, |place| place.translation.x = f32::NAN));
+    assert_eq!(nowhere.len(), 1, "{nowhere:?}");
+    let sees_nothing = said(hills(), |app, _, viewer| see(app, viewer, 0.0));
+    assert_eq!(sees_nothing.len(), 1, "{sees_nothing:?}");
+    let sees_too_much = said(hills(), |app, _, viewer| see(app, viewer, 1e6));
+    assert_eq!(sees_too_much.len(), 1, "{sees_too_much:?}");
+    let flat = said(hills(), |app, terrain, _| place(app, terrain, |place| place.scale = Vec3::ZERO));
+    assert_eq!(flat.len(), 1, "{flat:?}");
+    let panics = said(Terrain::endless(|_: [f64; 3]| -> f64 { panic!("on purpose") }), |_, _, _| ());
+    assert_eq!(panics.len(), 1, "{panics:?}");
+    assert!(panics[0].contains("panicked"), "{panics:?}");
+}
