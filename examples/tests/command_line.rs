@@ -1,6 +1,6 @@
-//! What `sculpt`, `ambiguous_cells`, `cellular_caves` and `falling_pieces` say and return: bad input gets one clear
-//! sentence and code 2, the headless runs make meshes without defects, `ambiguous_cells` prints its figures, and what
-//! `falling_pieces` cuts loose comes to rest.
+//! What `sculpt`, `ambiguous_cells`, `cellular_caves`, `falling_pieces` and `flyover` say and return: bad input gets one
+//! clear sentence and code 2, the headless runs make meshes without defects, `ambiguous_cells` prints its figures, what
+//! `falling_pieces` cuts loose comes to rest, and `flyover` counts what it loads.
 
 mod common;
 
@@ -268,4 +268,66 @@ fn without_a_display_a_piece_falls_and_comes_to_rest() {
     // As far as the gap is high.
     let steps = number("is at rest", "at rest, ");
     assert!(steps.is_some_and(|steps| (4..=20).contains(&steps)), "{said}");
+}
+
+#[test]
+fn bad_flights_are_refused() {
+    let refused = |args: &[&str], because| assert_refused_by("flyover", args, because);
+    for radius in ["", "0", "63", "1025", "-100", "NaN", "inf", "far"] {
+        refused(&[&format!("--radius={radius}")], "a number from 64 to 1024");
+    }
+    for speed in ["", "-1", "NaN", "1e9", "fast"] {
+        refused(&[&format!("--speed={speed}")], "a number from 0 to 100000");
+    }
+    for frames in ["", "0", "-1", "1.5", "10000001", "many"] {
+        refused(&["--headless", &format!("--frames={frames}")], "--frames");
+    }
+    refused(&["--look", "6"], "--look");
+    refused(&["--size", "640,360"], "--screenshot");
+    refused(&["--moment", "back"], "--screenshot");
+    refused(&["--screenshot", "a.png", "--moment", "never"], "arrived, dug, back");
+    refused(&["--headless", "--screenshot", "a.png"], "--headless");
+    refused(&["--screenshot", "a.jpg"], ".png");
+    refused(&["--headless", "--csv", "missing_folder/a.csv"], "no folder missing_folder");
+    refused(&["--headless", "--csv", "."], "folder");
+}
+
+#[test]
+fn without_a_display_a_flight_writes_a_line_per_update_and_a_summary() {
+    let path = folder_of_tests().join("flight.csv");
+    let _ = fs::remove_file(&path);
+    let flags = ["--radius", "96", "--speed", "200", "--frames", "300", "--csv", "flight.csv"];
+    let output = run("flyover", &flags);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}:\n{said}{}", output.status, String::from_utf8_lossy(&output.stderr));
+    assert!(said.contains("this is the headless run"), "{said}");
+    let summary = said.lines().last().expect("a summary");
+    assert!(summary.starts_with("300 updates in "), "{said}");
+    for part in ["p50", "p99", "max", "chunks meshed per second", "bytes per surface chunk", "fills empty"] {
+        assert!(summary.contains(part), "{summary}");
+    }
+
+    let table = fs::read_to_string(&path).expect("the table was written");
+    let mut lines = table.lines();
+    let columns: Vec<&str> = lines.next().expect("a head").split(',').collect();
+    let lines: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|number| number.parse().expect("a number")).collect()).collect();
+    assert_eq!(lines.len(), 300);
+    assert!(lines.iter().all(|line| line.len() == columns.len() && line.iter().all(|number| number.is_finite())));
+    let column = |name: &str| {
+        let index = columns.iter().position(|column| *column == name).unwrap_or_else(|| panic!("no column {name}"));
+        lines.iter().map(|line| line[index]).collect::<Vec<_>>()
+    };
+    assert!(column("update").iter().zip(0..).all(|(number, update)| *number == f64::from(update)));
+    // 200 voxels a second, 60 updates a second, from the first to the last of 300.
+    let way = |name: &str| column(name)[299] - column(name)[0];
+    let distance = way("x").hypot(way("z"));
+    assert!((distance - 299.0 * 200.0 / 60.0).abs() < 5.0, "flown {distance} voxels");
+    // It draws what it flies over, and what it left behind is gone.
+    let sum = |name: &str| column(name).iter().sum::<f64>();
+    for name in ["loaded", "unloaded", "filled", "meshed", "main_thread_ms"] {
+        assert!(sum(name) > 0.0, "nothing in column {name}:\n{summary}");
+    }
+    assert!(column("chunks_drawn")[299] > 10.0 && column("resident_bytes")[299] > 1e5, "{summary}");
+    assert!(sum("loaded") - sum("unloaded") < 0.7 * sum("loaded"), "{summary}");
 }

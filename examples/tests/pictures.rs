@@ -145,6 +145,21 @@ fn a_block_cut_open_shows_caves() {
 }
 
 #[test]
+fn an_endless_world_ends_in_haze_and_keeps_what_was_dug() {
+    let Some((arrived, _)) = flyover("flyover_arrived", "arrived") else { return };
+    arrived.assert_is_a_landscape();
+    // Hills stand out below; where the range ends, a little below the horizon, nothing but haze is left.
+    let [hills, haze] = [(0.75, 1.0), (0.36, 0.44)].map(|rows| arrived.roughness(rows));
+    assert!(hills > 4.0 * haze, "neighbouring pixels differ by {hills:.2} in the hills, by {haze:.2} in the haze");
+
+    let Some((dug, discs)) = flyover("flyover_dug", "dug") else { return };
+    assert_only_disc_changed(&arrived, &dug, &discs);
+    let Some((back, _)) = flyover("flyover_back", "back") else { return };
+    let differing = dug.pixels.iter().zip(&back.pixels).filter(|(a, b)| a != b).count();
+    assert_eq!(differing, 0, "of {} pixels so many differ after coming back", dug.pixels.len());
+}
+
+#[test]
 fn a_window_opens_and_shows_something() {
     let folder = folder_of_tests().join(format!("screen_{}", std::process::id()));
     fs::create_dir_all(&folder).expect("the folder of tests can be written");
@@ -224,6 +239,15 @@ fn render(command: &mut Command) -> Option<String> {
 fn sculpt(name: &str, flags: &[&str]) -> Option<(Picture, Vec<Disc>)> {
     let path = picture_path(name);
     let said = render(example("sculpt").args(["--size", SIZE]).args(flags).arg("--screenshot").arg(&path))?;
+    Some((Picture::read(&path), said.lines().filter_map(Disc::parse).collect()))
+}
+
+/// What one sees from a hill of the endless world. Where one went away, what was dug had been unloaded.
+fn flyover(name: &str, moment: &str) -> Option<(Picture, Vec<Disc>)> {
+    let path = picture_path(name);
+    let flags = ["--size", SIZE, "--radius", "224", "--moment", moment];
+    let said = render(example("flyover").args(flags).arg("--screenshot").arg(&path))?;
+    assert!(!said.contains("still loaded") && said.contains("the hole is unloaded") == (moment == "back"), "{said}");
     Some((Picture::read(&path), said.lines().filter_map(Disc::parse).collect()))
 }
 
@@ -330,6 +354,16 @@ impl Picture {
             let inner = self.pixels.chunks_exact(self.width).take(rows * 4 / 5).skip(rows / 8);
             inner.flat_map(|row| row[columns.clone()].iter().copied()).collect()
         })
+    }
+
+    /// How much pixels differ from those below them, in rows given as shares of the height. [Units: levels of 255]
+    fn roughness(&self, (from, to): (f64, f64)) -> f64 {
+        let rows: Vec<&[[u8; 3]]> = self.pixels.chunks_exact(self.width).collect();
+        let row = |share: f64| (share * rows.len() as f64) as usize;
+        let rows = &rows[row(from)..row(to)];
+        let differences = rows.windows(2).flat_map(|pair| pair[0].iter().zip(pair[1]));
+        let sum: f64 = differences.map(|(a, b)| f64::from(a[1].abs_diff(b[1]))).sum();
+        sum / ((rows.len() - 1) * self.width) as f64
     }
 
     /// Neither black nor uniform: sky above, something else below, and many colours.

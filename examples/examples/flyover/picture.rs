@@ -68,10 +68,10 @@ impl Plugin for HillPicturePlugin {
 
 /// Stands on the hill.
 fn climb(world: Res<World>, mut visit: ResMut<Visit>, mut commands: Commands) -> Result {
-    let hills = world.source()?;
+    let landscape = world.source()?;
     let line = || (-WITHIN..=WITHIN).step_by(12).map(f64::from);
     let places = line().flat_map(|x| line().map(move |z| [x, z]));
-    let top = places.map(|[x, z]| [x, hills.height(x, z), z]).max_by(|a, b| a[1].total_cmp(&b[1]));
+    let top = places.filter_map(|[x, z]| Some([x, landscape.height(x, z)?, z])).max_by(|a, b| a[1].total_cmp(&b[1]));
     let [x, y, z] = top.unwrap_or_default();
     visit.eye = Vec3::new(x as f32, y as f32 + EYE_LEVEL, z as f32);
     let camera = fly_camera(visit.eye, visit.eye + Vec3::new(0.0, -0.2, -1.0));

@@ -25,22 +25,29 @@ const HEIGHT: f32 = 448.0;
 const RELIEF: [f32; 2] = [-46.0, 46.0];
 /// Higher than all hills. [Units: voxels]
 pub(crate) const FLIGHT_LEVEL: f32 = 64.0;
+/// How deep below the ground tunnels reach. [Units: voxels]
+const TUNNELS: f64 = 28.0;
 /// How deep the ground's own colours reach; below is rock. [Units: voxels]
 const TOPSOIL: f64 = 2.0;
 /// The share of the range at which everything has faded, so that its end is not seen.
 const FADED: f32 = 0.95;
 
 impl World {
-    /// The hills.
+    /// Hills of different height, with tunnels a little below their surface.
     ///
     /// # Errors
     /// [`SourceError`] about a number that is out of its range.
-    pub(crate) fn source(&self) -> Result<NoiseHeights, SourceError> {
-        NoiseHeights::new(NoiseHeightsSettings {
-            noise: Fractal { seed: self.seed, octaves: 6, zoom: 150.0, ..Fractal::default() },
-            base: 0.0,
-            amplitude: 64.0,
-            strata: vec![Stratum { material: ROCK, below_depth: TOPSOIL, ..Stratum::default() }],
+    pub(crate) fn source(&self) -> Result<Landscape, SourceError> {
+        let noise = |number: u32, octaves: u32, zoom: f64| {
+            let seed = self.seed.wrapping_mul(16).wrapping_add(number);
+            Fractal { seed, octaves, zoom, ..Fractal::default() }
+        };
+        let heights = Layer::noise(noise(0, 6, 150.0), 58.0) + Layer::noise(noise(6, 2, 700.0), 30.0);
+        let deep = Solid::Everything.subtraction(heights.clone() + -TUNNELS);
+        let tunnels = Tunnels { noise: noise(8, 2, 110.0), radius: 5.0, lattice: 2 };
+        Landscape::new(LandscapeSettings {
+            solid: Solid::Ground(heights).subtraction(Solid::Tunnels(tunnels).intersection(deep)),
+            materials: vec![Stratum { material: ROCK, below_depth: TOPSOIL, ..Stratum::default() }.into()],
         })
     }
 
