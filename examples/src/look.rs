@@ -253,7 +253,7 @@ fn wear_look(
     commands.entity(sun).insert(cascades.build());
 
     let falloff = match scene.end {
-        Some(end) => FogFalloff::Linear { start: 0.3 * end, end },
+        Some(end) => FogFalloff::Linear { start: 0.4 * end, end },
         None => FogFalloff::from_visibility_squared(look.visibility * scene.size / 256.0),
     };
     for camera in &cameras {

@@ -25,7 +25,8 @@
 //! ```
 //!
 //! # How it works
-//! A [`Terrain`](terrain::Terrain) is filled from its [`Source`](source::Source), chunk by chunk, in tasks. Its
+//! A [`Terrain`](terrain::Terrain), of a fixed extent or endless, is filled from its [`Source`](source::Source), chunk by
+//! chunk, in tasks: all of it, or what [`TerrainViewer`](stream::TerrainViewer)s see. Its
 //! samples live in one place, its [`TerrainVolume`](terrain::TerrainVolume), which [`Stamp`](brush::Stamp) messages change;
 //! [`Chunk`](chunk::Chunk) entities, its children, mirror what is drawn. All chunks that an edit changes are
 //! meshed from one snapshot and shown in one update, a small edit in the update that reads its stamp. A
@@ -39,12 +40,12 @@
 //! - Bad settings, stamps, rays and sources that panic are refused or reported; the game goes on.
 //!
 //! # What is not
-//! - A terrain has a fixed extent and one level of detail. Edits are neither saved nor undone.
+//! - There is one level of detail. Edits are neither saved nor undone; those of chunks that are unloaded stay in memory.
 //! - Samples are changed on the main thread: a brush over 50 voxels in radius takes many milliseconds.
 //! - With Bevy's `RenderAssetBytesPerFrame` below what a group needs, its meshes may reach the screen frames apart.
 //!
 //! # Features
-//! On by default: `pbr` (materials), `gizmos` (bounds of chunks), `noise` and `png` (sources). Without them, and without any
+//! On by default: `pbr` (materials), `gizmos` (bounds and states of chunks), `noise` and `png` (sources). Without them, and without any
 //! renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
 //!
 //! Off by default: `big_space` puts chunks into the cells of a `big_space` grid, for worlds of any size. `serde` lets

@@ -22,9 +22,9 @@ pub(crate) const RADII: RangeInclusive<f32> = 64.0..=1_024.0;
 /// How high and low the viewer's range reaches at most, so that its chunks are not too many. [Units: voxels]
 const HEIGHT: f32 = 448.0;
 /// Between these heights most of the ground lies. [Units: voxels]
-const RELIEF: [f32; 2] = [-46.0, 46.0];
+const RELIEF: [f32; 2] = [-42.0, 40.0];
 /// Higher than all hills. [Units: voxels]
-pub(crate) const FLIGHT_LEVEL: f32 = 64.0;
+pub(crate) const FLIGHT_LEVEL: f32 = 60.0;
 /// How deep below the ground tunnels reach. [Units: voxels]
 const TUNNELS: f64 = 28.0;
 /// How deep the ground's own colours reach; below is rock. [Units: voxels]
@@ -42,7 +42,7 @@ impl World {
             let seed = self.seed.wrapping_mul(16).wrapping_add(number);
             Fractal { seed, octaves, zoom, ..Fractal::default() }
         };
-        let heights = Layer::noise(noise(0, 6, 150.0), 58.0) + Layer::noise(noise(6, 2, 700.0), 30.0);
+        let heights = Layer::noise(noise(0, 6, 140.0), 50.0) + Layer::noise(noise(6, 2, 600.0), 16.0);
         let deep = Solid::Everything.subtraction(heights.clone() + -TUNNELS);
         let tunnels = Tunnels { noise: noise(8, 2, 110.0), radius: 5.0, lattice: 2 };
         Landscape::new(LandscapeSettings {

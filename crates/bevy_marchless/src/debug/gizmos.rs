@@ -1,4 +1,4 @@
-//! Draws the bounds of chunks.
+//! Draws the bounds of chunks, in colours that tell their states.
 
 use bevy_app::{App, PostUpdate};
 use bevy_color::Color;
@@ -12,7 +12,8 @@ use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
 use bevy_transform::components::GlobalTransform;
 
-use crate::chunk::{Chunk, ChunkGeometry};
+use crate::chunk::{Chunk, ChunkGeometry, chunk_transform};
+use crate::stream::LeafState;
 use crate::terrain::TerrainVolume;
 
 /// Whether the bounds of chunks are drawn. Default: no.
@@ -26,15 +27,31 @@ pub struct ShowChunkBounds(pub bool);
 pub struct ChunkBoundsGizmos {
     /// The colour of chunks that have something to draw.
     pub drawn: Color,
-    /// The colour of the whole terrain's bounds.
+    /// The colour of chunks that are still to be filled or meshed.
+    pub waiting: Color,
+    /// The colour of chunks without a surface: a small cube in the middle of each.
+    pub empty: Color,
+    /// The colour of the whole terrain's bounds, where it is not endless.
     pub terrain: Color,
 }
 
 impl Default for ChunkBoundsGizmos {
     fn default() -> Self {
-        Self { drawn: Color::srgb(0.35, 0.55, 0.75), terrain: Color::srgb(0.9, 0.75, 0.3) }
+        Self {
+            drawn: Color::srgb(0.35, 0.55, 0.75),
+            waiting: Color::srgb(1.0, 0.45, 0.1),
+            empty: Color::srgba(0.6, 0.6, 0.6, 0.35),
+            terrain: Color::srgb(0.9, 0.75, 0.3),
+        }
     }
 }
+
+/// How far inside a chunk its bounds are drawn, so that neighbours' lines do not cover each other. [Units: voxels]
+const INSET: f32 = 0.25;
+/// The edge of an empty chunk's cube, as a share of the chunk's.
+const EMPTY_SHARE: f32 = 0.06;
+/// A terrain with more chunks along an axis has no bounds to draw.
+const ENDLESS: u32 = 1 << 16;
 
 pub(super) fn build(app: &mut App) {
     app.init_resource::<ShowChunkBounds>().register_type::<ShowChunkBounds>().register_type::<ChunkBoundsGizmos>();
@@ -45,30 +62,62 @@ pub(super) fn finish(app: &mut App) {
     if app.is_plugin_added::<GizmoPlugin>() {
         app.init_gizmo_group::<ChunkBoundsGizmos>().add_systems(
             PostUpdate,
-            draw_bounds.after(TransformSystems::Propagate).run_if(|show: Res<ShowChunkBounds>| show.0),
+            (draw_drawn, draw_others, draw_terrains)
+                .after(TransformSystems::Propagate)
+                .run_if(|show: Res<ShowChunkBounds>| show.0),
         );
     }
 }
 
-fn draw_bounds(
+fn draw_drawn(
     chunks: Query<(&Chunk, &ChunkGeometry, &GlobalTransform)>,
-    terrains: Query<(&TerrainVolume, &GlobalTransform)>,
+    volumes: Query<&TerrainVolume>,
     mut gizmos: Gizmos<ChunkBoundsGizmos>,
 ) {
-    let (drawn, whole) = (gizmos.config_ext.drawn, gizmos.config_ext.terrain);
-    let cuboid = |size: Vec3| Aabb3d::from_min_max(Vec3::ZERO, size);
+    let color = gizmos.config_ext.drawn;
     for (chunk, geometry, transform) in &chunks {
-        if let Ok((volume, _)) = terrains.get(chunk.terrain)
+        if let Ok(volume) = volumes.get(chunk.terrain)
             && !geometry.mesh.is_empty()
         {
-            gizmos.aabb_3d(cuboid(Vec3::splat(volume.grid().chunk_cells() as f32)), *transform, drawn);
+            gizmos.aabb_3d(inset(volume.grid().chunk_cells()), *transform, color);
         }
     }
+}
+
+/// Draws chunks that have no entity.
+fn draw_others(volumes: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos: Gizmos<ChunkBoundsGizmos>) {
+    let (waiting, empty) = (gizmos.config_ext.waiting, gizmos.config_ext.empty);
+    for (volume, to_world) in &volumes {
+        let Some(settings) = volume.settings() else { continue };
+        let cells = settings.chunk_cells;
+        let middle = Vec3::splat(0.5 * cells as f32);
+        let mark = 0.5 * EMPTY_SHARE * cells as f32;
+        for leaf in volume.chunks.keys().filter_map(|key| volume.leaf_at(IVec3::from(key.position))) {
+            let transform =
+                to_world.mul_transform(chunk_transform(leaf.position.to_array(), cells, settings.voxel_size));
+            match leaf.state {
+                LeafState::Drawn => {}
+                LeafState::Waiting => gizmos.aabb_3d(inset(cells), transform, waiting),
+                LeafState::Empty => gizmos.aabb_3d(Aabb3d::new(middle, Vec3::splat(mark)), transform, empty),
+            }
+        }
+    }
+}
+
+fn draw_terrains(terrains: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos: Gizmos<ChunkBoundsGizmos>) {
+    let color = gizmos.config_ext.terrain;
     for (volume, transform) in &terrains {
-        if let Some(settings) = volume.settings() {
+        if let Some(settings) = volume.settings()
+            && settings.extent.size().max_element() <= ENDLESS
+        {
             let corner = |chunk: IVec3| chunk.as_vec3() * settings.chunk_cells as f32 * settings.voxel_size;
             let bounds = Aabb3d::from_min_max(corner(settings.extent.min), corner(settings.extent.max));
-            gizmos.aabb_3d(bounds, *transform, whole);
+            gizmos.aabb_3d(bounds, *transform, color);
         }
     }
+}
+
+/// The box of a chunk of so many cells, in voxels from its corner.
+fn inset(cells: u32) -> Aabb3d {
+    Aabb3d::from_min_max(Vec3::splat(INSET), Vec3::splat(cells as f32 - INSET))
 }
