@@ -11,8 +11,7 @@ use crate::world::World;
 /// The hill that one stands on is the highest within so many voxels of the origin, and so far above it is the eye.
 const WITHIN: i32 = 600;
 const EYE_LEVEL: f32 = 12.0;
-/// Where one digs, from the eye. The hole's radius is in voxels.
-const DIG_TOWARDS: Vec3 = Vec3::new(0.05, -0.42, -1.0);
+/// The hole's radius. [Units: voxels]
 const HOLE: f32 = 14.0;
 /// How fast the journey is. [Units: voxels per update]
 const PACE: f32 = 64.0;
@@ -96,8 +95,12 @@ fn go_on(
     let next = match visit.step {
         Step::Arriving if is_settled && visit.until == Moment::Arrived => Step::Done,
         Step::Arriving if is_settled => {
-            let Ok(direction) = Dir3::new(DIG_TOWARDS) else { return };
-            let Some(hit) = query.ray_cast_terrain(terrain, Ray3d::new(visit.eye, direction), world.radius) else {
+            // To the right and down, as little as meets ground nearby.
+            let hit = (4..20).find_map(|steep| {
+                let direction = Dir3::new(Vec3::new(0.3, -0.1 * steep as f32, -1.0)).ok()?;
+                query.ray_cast_terrain(terrain, Ray3d::new(visit.eye, direction), 0.6 * world.radius)
+            });
+            let Some(hit) = hit else {
                 eprintln!("flyover: there is nothing to dig.");
                 exit.write(AppExit::error());
                 return;
