@@ -245,7 +245,7 @@ fn sculpt(name: &str, flags: &[&str]) -> Option<(Picture, Vec<Disc>)> {
 /// What one sees from a hill of the endless world. Where one went away, what was dug had been unloaded.
 fn flyover(name: &str, moment: &str) -> Option<(Picture, Vec<Disc>)> {
     let path = picture_path(name);
-    let flags = ["--size", SIZE, "--radius", "224", "--moment", moment];
+    let flags = ["--size", SIZE, "--radius", "192", "--moment", moment];
     let said = render(example("flyover").args(flags).arg("--screenshot").arg(&path))?;
     assert!(!said.contains("still loaded") && said.contains("the hole is unloaded") == (moment == "back"), "{said}");
     Some((Picture::read(&path), said.lines().filter_map(Disc::parse).collect()))
