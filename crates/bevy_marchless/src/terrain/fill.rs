@@ -36,6 +36,8 @@ pub(crate) struct Filled {
 struct Sampled {
     chunk: Chunk<i16>,
     signs: Signs,
+    /// What they are the signs of.
+    isovalue: f32,
     /// Whether the source filled it, instead of being certain of it.
     filled: bool,
 }
@@ -58,7 +60,7 @@ pub(crate) fn fill_chunk(
         let chunk = catch_unwind(AssertUnwindSafe(sample)).ok();
         let chunk = chunk.map(|(chunk, filled)| {
             let signs = Signs::of(&chunk, isovalue);
-            Sampled { chunk, signs, filled }
+            Sampled { chunk, signs, isovalue, filled }
         });
         results.push(Filled { terrain: entity, filling, position, sampled: chunk, time: start.elapsed() });
     })
@@ -87,12 +89,15 @@ pub(crate) fn take_filled_chunks(
             continue;
         }
         stats.fill_time += time;
-        let Sampled { chunk, signs, filled } = sampled.unwrap_or_else(|| {
+        let Sampled { chunk, mut signs, isovalue, filled } = sampled.unwrap_or_else(|| {
             bevy_log::error_once!("a terrain's source panicked; chunk {position:?} of terrain {terrain} stays air");
-            Sampled { chunk: Chunk::AIR, signs: Signs::UNKNOWN, filled: false }
+            Sampled { chunk: Chunk::AIR, signs: Signs::UNKNOWN, isovalue: 0.0, filled: false }
         });
         stats.filled += u64::from(filled);
         stats.filled_empty += u64::from(filled && !signs.may_have_surface());
+        if volume.settings.as_ref().is_none_or(|settings| settings.isovalue != isovalue) {
+            signs = Signs::UNKNOWN;
+        }
         let (volume, key) = (&mut *volume, ChunkKey::finest(position));
         let is_remote = volume.streaming.take_remote(position);
         match volume.chunks.get(&key).map(|state| &state.fill) {
