@@ -1,0 +1,102 @@
+//! Worlds to fly through, and ways through them.
+
+use bevy_marchless::prelude::*;
+use bevy_math::Vec3;
+use bevy_transform::components::Transform;
+
+use crate::PACE;
+
+/// What the world is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum World {
+    /// The default hills.
+    Hills,
+    /// The same, with caves in three dimensions.
+    Caves,
+}
+
+impl World {
+    pub(crate) const ALL: [Self; 2] = [Self::Hills, Self::Caves];
+
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Hills => "hills",
+            Self::Caves => "caves",
+        }
+    }
+
+    pub(crate) fn terrain(self) -> Terrain {
+        match self {
+            Self::Hills => Terrain::endless(NoiseHeights::default()),
+            Self::Caves => {
+                let ground = Some(NoiseHeightsSettings::default());
+                let settings = NoiseDensitySettings { ground, ..NoiseDensitySettings::default() };
+                Terrain::endless(NoiseDensity::new(settings).expect("the defaults are in range"))
+            }
+        }
+    }
+}
+
+/// A way through a world.
+pub(crate) struct Route {
+    pub(crate) name: &'static str,
+    pub(crate) viewers: usize,
+    /// Where a viewer is after so many seconds, in voxels.
+    pub(crate) place: fn(seconds: f32, viewer: usize) -> Vec3,
+    /// Seconds between two teleports, which lie so far apart that nothing of the former view is left.
+    pub(crate) teleport: Option<u32>,
+    /// Updates between two balls of radius 5 dug in front of the viewer.
+    pub(crate) dig: Option<u32>,
+}
+
+const STRAIGHT: Route = Route {
+    name: "straight, 64 voxels/s",
+    viewers: 1,
+    place: |seconds, _| Vec3::new(64.0 * seconds, 80.0, 0.0),
+    teleport: None,
+    dig: None,
+};
+
+pub(crate) const ROUTES: [Route; 6] = [
+    STRAIGHT,
+    Route { name: "straight, 256 voxels/s", place: |seconds, _| Vec3::new(256.0 * seconds, 80.0, 0.0), ..STRAIGHT },
+    Route {
+        name: "spiral",
+        place: |seconds, _| {
+            let (sin, cos) = (0.6 * seconds).sin_cos();
+            Vec3::new(cos, 0.0, sin) * (40.0 + 6.0 * seconds) + Vec3::Y * (60.0 + 20.0 * (0.3 * seconds).sin())
+        },
+        ..STRAIGHT
+    },
+    Route {
+        name: "teleports",
+        place: |seconds, _| Vec3::new(3_000.0 * (seconds / 5.0).floor(), 70.0, 0.0),
+        teleport: Some(5),
+        ..STRAIGHT
+    },
+    Route {
+        name: "two viewers",
+        viewers: 2,
+        place: |seconds, viewer| {
+            let side = if viewer == 0 { 1.0 } else { -1.0 };
+            Vec3::new(side * (500.0 + 48.0 * seconds), 80.0, 16.0 * seconds)
+        },
+        ..STRAIGHT
+    },
+    Route { name: "digging", place: |seconds, _| Vec3::new(32.0 * seconds, 70.0, 0.0), dig: Some(6), ..STRAIGHT },
+];
+
+impl Route {
+    /// Where a viewer is in an update, and that it looks where it flies.
+    pub(crate) fn transform(&self, update: u32, viewer: usize) -> Transform {
+        let place = |update: u32| (self.place)(update as f32 / PACE as f32, viewer);
+        let (from, ahead) = (place(update), place(update + 1));
+        let forward = (ahead - from).try_normalize().filter(|_| self.teleport.is_none()).unwrap_or(Vec3::X);
+        Transform::from_translation(from).looking_to(forward, Vec3::Y)
+    }
+
+    /// Whether the viewers are somewhere else in this update.
+    pub(crate) fn teleports(&self, update: u32) -> bool {
+        self.teleport.is_some_and(|seconds| update > 0 && update.is_multiple_of(seconds * PACE))
+    }
+}
