@@ -294,6 +294,7 @@ fn settings_out_of_range_are_refused_with_their_lines() {
         ("(source: NoiseHeights(noise: (zoom: NaN)))", &[1], "zoom"),
         ("(source: Landscape(solid:\nGround(Minimum([]))))", &[], "at least 1"),
         ("(source: Sdf(Sphere(center: (0, 0, 0),\n radius: -1)))", &[2], "line 2: a sphere's radius"),
+        ("(source: HeightMap(picture: \"x.png\",\n settings: (exaggeration: -3.25)))", &[2], "exaggeration"),
     ] {
         match WorldDescription::from_ron(text) {
             Err(WorldError::Source { lines: found, error }) => {

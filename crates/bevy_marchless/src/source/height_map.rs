@@ -41,6 +41,21 @@ impl Default for HeightMapSettings {
     }
 }
 
+impl HeightMapSettings {
+    /// Says what is wrong with the settings, if anything is. What they make of a picture may still reach too far.
+    ///
+    /// # Errors
+    /// [`SourceError::Setting`] for the first number that is out of its range.
+    pub fn validate(&self) -> Result<(), SourceError> {
+        check_length("metres per pixel along x", self.metres_per_pixel.x)?;
+        check_length("metres per pixel along z", self.metres_per_pixel.y)?;
+        check_length("metres per unit", self.metres_per_unit)?;
+        check_length("exaggeration", self.exaggeration)?;
+        check_position("the floor", self.floor.unwrap_or(0.0))?;
+        Ok(())
+    }
+}
+
 /// Ground whose heights are samples in a grid, bicubic (Catmull–Rom) between them.
 ///
 /// The picture's left edge lies at x = 0, its top edge at z = 0; each sample stands in the middle of its pixel, and
@@ -118,10 +133,7 @@ impl HeightMap {
     /// # Errors
     /// [`SourceError`] for settings that are out of range.
     pub fn with_settings(self, settings: HeightMapSettings) -> Result<Self, SourceError> {
-        check_length("metres per pixel along x", settings.metres_per_pixel.x)?;
-        check_length("metres per pixel along z", settings.metres_per_pixel.y)?;
-        check_length("metres per unit", settings.metres_per_unit)?;
-        check_length("exaggeration", settings.exaggeration)?;
+        settings.validate()?;
         let mut map = Self { settings, floor: 0.0, ..self };
         check_length("the map's longer side", map.size_in_world().max_element())?;
         check_position("the highest point above the lowest one", map.max_height())?;

@@ -153,13 +153,12 @@ impl WorldDescription {
 
     /// Whether all settings are in their ranges; a picture may still be missing.
     fn check(&self) -> Result<(), WorldError> {
-        match self.terrain() {
-            #[cfg(feature = "png")]
-            Err(WorldError::NoPicture { .. }) => {
-                Self { source: WorldSource::Air, ..self.clone() }.terrain().map(|_| ())
-            }
-            other => other.map(|_| ()),
+        #[cfg(feature = "png")]
+        if let WorldSource::HeightMap(WorldHeightMap { settings, map: None, .. }) = &self.source {
+            settings.validate()?;
+            return Self { source: WorldSource::Air, ..self.clone() }.check();
         }
+        self.terrain().map(|_| ())
     }
 }
 
