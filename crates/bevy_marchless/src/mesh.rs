@@ -31,7 +31,7 @@ use crate::chunk::{ChunkGeometry, ChunkKey, mesh_bounds, new_chunk};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
 use crate::stats::{MainThread, Stats};
 use crate::stream::{StreamStats, Wanted, in_flight};
-use crate::terrain::{Group, Pending, TerrainVolume, same_samples};
+use crate::terrain::{ChunkState, Group, Pending, TerrainVolume, same_samples};
 use crate::work::{Priority, Results, WorkQueue};
 
 /// The number of a vertex's material, a `u32`, for shaders.
@@ -168,15 +168,16 @@ impl Start<'_, '_, '_> {
         let limit = in_flight(settings);
         let mut ready = core::mem::take(&mut volume.ready);
         if volume.first_meshes + ready.len() > limit {
-            let ranges = volume.streaming.ranges();
+            let (ranges, chunks) = (volume.streaming.ranges(), &volume.chunks);
+            ready.retain(|key| chunks.get(key).is_some_and(ChunkState::is_ready));
             // Those that come first are at the end.
-            ready.sort_by_cached_key(|key| Reverse(ranges.urgency(key.position)));
+            ready.sort_by_cached_key(|key| (Reverse(ranges.urgency(key.position)), *key));
+            ready.dedup();
         }
         let mut no_longer_drawn = BTreeSet::new();
         let (mut done, mut later) = (0, Vec::new());
         while let Some(key) = ready.pop() {
-            let Some(state) = volume.chunks.get(&key) else { continue };
-            let is_ready = state.wanted == Wanted::Mesh && state.missing == 0 && (!state.drawn || state.stale);
+            let is_ready = volume.chunks.get(&key).is_some_and(ChunkState::is_ready);
             if !is_ready || volume.pending.iter().any(|pending| pending.chunks.contains(&key)) {
                 // Gone, or meshed already; or it will be, with the changed ones.
                 continue;

@@ -1,5 +1,6 @@
 //! [`Streaming`]: what becomes of chunks when ranges change.
 
+use core::cmp::Reverse;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -103,21 +104,24 @@ impl Streaming {
         self.asked -= 1;
     }
 
+    /// Sorts the chunks whose lot is to be decided, and forgets those that nothing is to become of any more.
     fn sort(&mut self) {
         let ranges = &self.ranges;
-        self.arriving.sort_by_cached_key(|key| core::cmp::Reverse(ranges.urgency(key.position)));
+        self.arriving.retain(|key| ranges.wanted(key.position, Wanted::Samples) > Wanted::Gone);
+        self.arriving.sort_by_cached_key(|key| (Reverse(ranges.urgency(key.position)), *key));
+        self.arriving.dedup();
         self.to_fill_is_sorted = false;
     }
 
     /// Takes new ranges, and notes which chunks they concern.
-    fn change(&mut self, new: Ranges) {
+    fn change(&mut self, new: Ranges, is_loaded: impl Fn(&ChunkKey) -> bool) {
         let old = core::mem::replace(&mut self.ranges, new);
         self.drops = self.ranges.0.iter().any(|viewed| viewed.samples.is_some());
         let (arriving, leaving) = (&mut self.arriving, &mut self.leaving);
         self.ranges.differences(
             &old,
             |position| arriving.push(ChunkKey::finest(position)),
-            |position| leaving.push(ChunkKey::finest(position)),
+            |position| leaving.extend(Some(ChunkKey::finest(position)).filter(&is_loaded)),
         );
         self.sort();
     }
@@ -181,7 +185,8 @@ pub(crate) fn follow_viewers(
         ranges.0.extend(viewers.iter().filter_map(|(viewer, ..)| found.get(viewer)));
         if ranges != volume.streaming.ranges {
             volume.streaming.viewers = found;
-            volume.streaming.change(ranges);
+            let TerrainVolume { streaming, chunks, .. } = &mut *volume;
+            streaming.change(ranges, |key| chunks.contains_key(key));
         }
         if volume.streaming.drops && volume.streaming.may_drop_more && volume.is_settled() {
             volume.streaming.may_drop_more = false;
@@ -315,21 +320,21 @@ impl Follow<'_, '_, '_> {
             spacing: f64::from(terrain.voxel_size),
             isovalue: terrain.isovalue,
         };
+        // At least as many may go as come, so that there are never more than the ranges hold and what is on its way out.
+        let half = Instant::now() + until.saturating_duration_since(Instant::now()) / 2;
         let mut done = 0;
-        while let Some(key) = self.volume.streaming.arriving.pop() {
+        while (done < 2 * LEAST || done % 8 != 0 || Instant::now() < half)
+            && let Some(key) = self.volume.streaming.leaving.pop()
+        {
             self.settle(key, &asked);
             done += 1;
-            if done >= LEAST && done % 8 == 0 && Instant::now() >= until {
-                break;
-            }
         }
         let mut done = 0;
-        while let Some(key) = self.volume.streaming.leaving.pop() {
+        while (done < LEAST || done % 8 != 0 || Instant::now() < until)
+            && let Some(key) = self.volume.streaming.arriving.pop()
+        {
             self.settle(key, &asked);
             done += 1;
-            if done >= LEAST && done % 8 == 0 && Instant::now() >= until {
-                break;
-            }
         }
     }
 
@@ -535,8 +540,11 @@ pub(crate) fn ask_for_samples(
         let Some(terrain) = &volume.settings else { continue };
         let streaming = &mut volume.streaming;
         if !streaming.to_fill_is_sorted {
-            let ranges = &streaming.ranges;
-            streaming.to_fill.sort_by_cached_key(|key| core::cmp::Reverse(ranges.urgency(key.position)));
+            let (ranges, chunks) = (&streaming.ranges, &volume.chunks);
+            let waits = |key: &ChunkKey| chunks.get(key).is_some_and(|state| matches!(state.fill, Fill::Waiting));
+            streaming.to_fill.retain(waits);
+            streaming.to_fill.sort_by_cached_key(|key| (Reverse(ranges.urgency(key.position)), *key));
+            streaming.to_fill.dedup();
             streaming.to_fill_is_sorted = true;
         }
         while streaming.asked < limit

@@ -291,7 +291,7 @@ impl TerrainVolume {
         for neighbour in key.around() {
             if let Some(state) = self.chunks.get_mut(&neighbour) {
                 state.missing -= 1;
-                if state.missing == 0 && state.wanted == Wanted::Mesh && (!state.drawn || state.stale) {
+                if state.is_ready() {
                     self.ready.push(neighbour);
                 }
             }
@@ -386,6 +386,11 @@ impl ChunkState {
     /// Whether its samples are there.
     pub(crate) const fn is_filled(&self) -> bool {
         matches!(self.fill, Fill::Done)
+    }
+
+    /// Whether it can be meshed, and what is drawn of it is not up to date.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.wanted == Wanted::Mesh && self.missing == 0 && (!self.drawn || self.stale)
     }
 
     const fn leaf_state(&self) -> LeafState {
