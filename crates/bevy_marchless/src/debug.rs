@@ -13,7 +13,6 @@ use crate::chunk::ChunkGeometry;
 use crate::mesh::geometry_bytes;
 use crate::schedule::MarchlessSystems;
 use crate::stats::{MainThread, Stats};
-use crate::stream::StreamStats;
 use crate::terrain::TerrainVolume;
 
 /// Measures the plugin's work in Bevy's `DiagnosticsStore`, and with the feature `gizmos` draws the bounds of chunks.
@@ -77,12 +76,9 @@ fn measure(
     geometries: Query<&ChunkGeometry>,
     volumes: Query<&TerrainVolume>,
     mut stats: ResMut<Stats>,
-    mut stream: ResMut<StreamStats>,
-    mut main_thread: ResMut<MainThread>,
+    main_thread: Res<MainThread>,
     mut diagnostics: Diagnostics,
 ) {
-    let main_thread = main_thread.take();
-    (stream.main_thread, stream.main_thread_last) = (stream.main_thread + main_thread, main_thread);
     let (mut drawn, mut triangles, mut bytes) = (0u32, 0, 0);
     for mesh in geometries.iter().map(|geometry| &geometry.mesh).filter(|mesh| !mesh.is_empty()) {
         (drawn, triangles, bytes) = (drawn + 1, triangles + mesh.triangle_count(), bytes + geometry_bytes(mesh));
@@ -96,7 +92,7 @@ fn measure(
     let waiting = || volumes.iter().map(TerrainVolume::waiting).sum::<usize>();
     diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || waiting() as f64);
     let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
-    diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(main_thread));
+    diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(main_thread.so_far()));
     if stats.update % 64 == 1 {
         bytes += volumes.iter().map(TerrainVolume::sample_bytes).sum::<usize>();
         diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes as f64);

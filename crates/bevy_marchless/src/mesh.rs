@@ -236,16 +236,25 @@ impl Start<'_, '_, '_> {
             members: 0,
             meshed: Vec::new(),
         };
+        // What is drawn changes with the others: where samples around it are missing, all wait for them.
+        let mut waits = false;
+        for key in &group.chunks {
+            if let Some(state) = volume.chunks.get_mut(key)
+                && state.wanted == Wanted::Mesh
+                && (state.drawn && !state.hidden && state.missing > 0)
+            {
+                (state.stale, waits) = (true, true);
+                volume.streaming.look_at(*key);
+            }
+        }
+        if waits {
+            volume.pending.push(Pending { chunks: group.chunks, since });
+            return;
+        }
         let mut jobs = Vec::new();
         for key in &group.chunks {
-            let Some(state) = volume.chunks.get_mut(key) else { continue };
-            if state.wanted != Wanted::Mesh || state.hidden {
-                continue;
-            }
-            if state.missing > 0 {
-                // It comes as soon as its surroundings have been filled.
-                state.stale = state.drawn;
-                volume.streaming.look_at(*key);
+            let is_member = |state: &ChunkState| state.wanted == Wanted::Mesh && !state.hidden && state.missing == 0;
+            if !volume.chunks.get(key).is_some_and(is_member) {
                 continue;
             }
             group.members += 1;

@@ -8,7 +8,8 @@ use bevy_ecs::prelude::*;
 use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
 
-use crate::stats::{Stats, count_update};
+use crate::stats::{MainThread, Stats, count_update, sum_up};
+use crate::stream::StreamStats;
 use crate::work::{WorkQueue, start_work};
 
 /// The plugin's systems. All of them run in [`PostUpdate`], before transforms are propagated and asset events are
@@ -98,6 +99,9 @@ impl Plugin for SchedulePlugin {
                 (ReadStamps, Work).chain().before(TransformSystems::Propagate).before(AssetEventSystems),
             )
             .configure_sets(PostUpdate, (Prepare, Fill, Edit, Mesh, Report).chain().in_set(Work))
-            .add_systems(PostUpdate, start_work.in_set(Work).after(Mesh).before(Report));
+            .init_resource::<MainThread>()
+            .init_resource::<StreamStats>()
+            .add_systems(PostUpdate, start_work.in_set(Work).after(Mesh).before(Report))
+            .add_systems(PostUpdate, sum_up.in_set(Work).after(Report));
     }
 }

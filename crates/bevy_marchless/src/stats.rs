@@ -4,6 +4,8 @@ use bevy_ecs::prelude::*;
 use bevy_platform::time::Instant;
 use core::time::Duration;
 
+use crate::stream::StreamStats;
+
 /// The work of one update; the diagnostics read it and start it over.
 #[derive(Resource, Debug, Default)]
 pub(crate) struct Stats {
@@ -68,13 +70,20 @@ impl MainThread {
     /// Until when a system that has begun at `start` may go on, if all of the update's systems so far are to take this
     /// long.
     pub(crate) fn until(&self, start: Instant, all: Duration) -> Instant {
-        start + all.saturating_sub(self.0)
+        let left = all.saturating_sub(self.0);
+        start.checked_add(left).unwrap_or_else(|| start + Duration::from_secs(3_600))
     }
 
-    /// The update's time; from now on, the next update's.
-    pub(crate) fn take(&mut self) -> Duration {
-        core::mem::take(&mut self.0)
+    /// The update's time so far.
+    pub(crate) const fn so_far(&self) -> Duration {
+        self.0
     }
+}
+
+/// Ends the update's time.
+pub(crate) fn sum_up(mut main_thread: ResMut<MainThread>, mut stream: ResMut<StreamStats>) {
+    let time = core::mem::take(&mut main_thread.0);
+    (stream.main_thread, stream.main_thread_last) = (stream.main_thread + time, time);
 }
 
 pub(crate) fn count_update(mut stats: ResMut<Stats>) {

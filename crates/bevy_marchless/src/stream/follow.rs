@@ -40,8 +40,8 @@ const MOST_STAMPS: usize = 64;
 #[derive(Default)]
 pub(crate) struct Streaming {
     ranges: Ranges,
-    /// The latest good range of each viewer.
-    viewers: HashMap<Entity, Viewed>,
+    /// The latest good range of each viewer, and what it was made from.
+    viewers: HashMap<Entity, (TerrainViewer, Viewed)>,
     /// Chunks that ranges may ask for; the most urgent last. Some several times, some no longer.
     arriving: Vec<ChunkKey>,
     /// Chunks that ranges may no longer ask for.
@@ -55,7 +55,7 @@ pub(crate) struct Streaming {
     boxes: HashMap<[i32; 3], Option<Chunk<i16>>>,
     /// Chunks that are not loaded, but are being filled for the stamps that wait for them.
     remote: HashMap<[i32; 3], Ticket>,
-    /// Whether samples may be dropped, and whether there may be some that could be.
+    /// Whether samples may be dropped, and whether all chunks are to be looked at for that when nothing else is to do.
     drops: bool,
     pub(crate) may_drop_more: bool,
     /// Whether a stamp waits for samples that had been dropped.
@@ -116,7 +116,9 @@ impl Streaming {
     /// Takes new ranges, and notes which chunks they concern.
     fn change(&mut self, new: Ranges, is_loaded: impl Fn(&ChunkKey) -> bool) {
         let old = core::mem::replace(&mut self.ranges, new);
-        self.drops = self.ranges.0.iter().any(|viewed| viewed.samples.is_some());
+        // What was dropped once has to come back some time.
+        self.drops |= self.ranges.0.iter().any(|viewed| viewed.samples.is_some());
+        self.may_drop_more |= self.drops;
         let (arriving, leaving) = (&mut self.arriving, &mut self.leaving);
         self.ranges.differences(
             &old,
@@ -151,12 +153,14 @@ pub(crate) fn follow_viewers(
     mut stats: ResMut<StreamStats>,
     mut main_thread: ResMut<MainThread>,
     mut commands: Commands,
-    mut reported: Local<HashSet<Entity>>,
+    mut reported: Local<HashSet<(Entity, Entity)>>,
 ) {
     let start = main_thread.start();
     let mut viewers: Vec<_> = viewers.iter().collect();
     viewers.sort_by_key(|(viewer, ..)| *viewer);
-    reported.retain(|entity| viewers.iter().any(|(viewer, ..)| viewer == entity) || terrains.contains(*entity));
+    reported.retain(|(terrain, about)| {
+        terrains.contains(*terrain) && (terrain == about || viewers.iter().any(|(viewer, ..)| viewer == about))
+    });
     for (terrain, mut volume, place) in &mut terrains {
         let Some(settings_in_effect) = &volume.settings else { continue };
         // Where things are in this very update; in a floating space, where they were when transforms were last propagated.
@@ -171,9 +175,10 @@ pub(crate) fn follow_viewers(
         let mut found = HashMap::default();
         for (viewer, settings, propagated) in &viewers {
             let at = if place.is_floating() { (!propagated.is_added()).then_some(**propagated) } else { now(*viewer) };
-            let seen = at.and_then(|at| look.at(terrain, *viewer, settings, &at));
-            if let Some(viewed) = seen.or_else(|| volume.streaming.viewers.get(viewer).copied()) {
-                found.insert(*viewer, viewed);
+            let known = volume.streaming.viewers.get(viewer).copied();
+            let seen = at.and_then(|at| look.at(terrain, *viewer, settings, &at, known));
+            if let Some(seen) = seen.map(|viewed| (**settings, viewed)).or(known) {
+                found.insert(*viewer, seen);
             }
         }
         let (extent, kept) = (settings_in_effect.chunk_region(), settings_in_effect.kept_region());
@@ -182,9 +187,11 @@ pub(crate) fn follow_viewers(
             let range = Range::of_box(kept, extent);
             ranges.0.push(Viewed { range, margin: 0.0, samples: None, forward: [0.0; 3] });
         }
-        ranges.0.extend(viewers.iter().filter_map(|(viewer, ..)| found.get(viewer)));
-        if ranges != volume.streaming.ranges {
+        ranges.0.extend(viewers.iter().filter_map(|(viewer, ..)| found.get(viewer)).map(|(_, viewed)| *viewed));
+        if found != volume.streaming.viewers {
             volume.streaming.viewers = found;
+        }
+        if ranges != volume.streaming.ranges {
             let TerrainVolume { streaming, chunks, .. } = &mut *volume;
             streaming.change(ranges, |key| chunks.contains_key(key));
         }
@@ -208,7 +215,7 @@ struct Look<'a> {
     /// From world space to the terrain's own.
     to_terrain: Option<DAffine3>,
     /// What has been warned of.
-    reported: &'a mut HashSet<Entity>,
+    reported: &'a mut HashSet<(Entity, Entity)>,
 }
 
 impl Look<'_> {
@@ -219,9 +226,12 @@ impl Look<'_> {
         viewer: Entity,
         settings: &TerrainViewer,
         place: &GlobalTransform,
+        known: Option<(TerrainViewer, Viewed)>,
     ) -> Option<Viewed> {
         let Some(to_terrain) = self.to_terrain.filter(|to_terrain| to_terrain.is_finite()) else {
-            self.warn(terrain, || format!("terrain {terrain} cannot be followed: its transform has no inverse"));
+            self.warn(terrain, terrain, || {
+                format!("terrain {terrain} cannot be followed: its transform has no inverse")
+            });
             return None;
         };
         let cells = f64::from(self.terrain.chunk_cells);
@@ -232,7 +242,7 @@ impl Look<'_> {
         let radii = settings.radii.as_dvec3().to_array().map(|v| if v > FARTHEST { FARTHEST } else { v } / cells);
         let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
         if !at.iter().all(|v| v.is_finite()) {
-            self.warn(viewer, || {
+            self.warn(terrain, viewer, || {
                 format!("terrain viewer {viewer} has no finite position ({position}); it loads nothing new")
             });
             return None;
@@ -240,7 +250,7 @@ impl Look<'_> {
         // Not a number is not above 0 either.
         if !(radii.iter().all(|radius| *radius > 0.0) && margin >= 0.0 && samples >= 0.0) {
             let TerrainViewer { radii, margin, sample_radius } = settings;
-            self.warn(viewer, || {
+            self.warn(terrain, viewer, || {
                 format!(
                     "terrain viewer {viewer} needs radii above 0 and a margin and a sample radius of 0 or more, in voxels, \
                      but has {radii}, {margin} and {sample_radius}; it loads nothing new"
@@ -250,12 +260,21 @@ impl Look<'_> {
         }
         let middle = at.map(|v| (v / STEP).round() * STEP);
         let extent = self.terrain.chunk_region();
+        // In steps, so that looking around changes little.
+        let forward = place.affine().transform_vector3(Vec3::NEG_Z).as_dvec3();
+        let forward = to_terrain.transform_vector3(forward).normalize_or_zero();
+        let forward = (forward * 2.0).round().to_array();
+        if let Some((as_before, viewed)) = known
+            && (as_before, viewed.range.middle(), viewed.range.extent()) == (*settings, middle, extent)
+        {
+            return Some(Viewed { forward, ..viewed });
+        }
         let whole = Range::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
         let range = limited(whole);
         if range == whole {
-            self.reported.remove(&viewer);
+            self.reported.remove(&(terrain, viewer));
         } else {
-            self.warn(viewer, || {
+            self.warn(terrain, viewer, || {
                 format!(
                     "terrain viewer {viewer} asks for more than {} chunks with radii of {} voxels; they are scaled down",
                     Terrain::MAX_CHUNKS,
@@ -267,15 +286,11 @@ impl Look<'_> {
         // Where all that may be loaded lies within, none are dropped.
         let drops = samples < range.longest() + margin + 2.0;
         let samples = drops.then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
-        // In steps, so that looking around changes little.
-        let forward = place.affine().transform_vector3(Vec3::NEG_Z).as_dvec3();
-        let forward = to_terrain.transform_vector3(forward).normalize_or_zero();
-        let forward = (forward * 2.0).round().to_array();
         Some(Viewed { range, margin, samples, forward })
     }
 
-    fn warn(&mut self, about: Entity, text: impl FnOnce() -> String) {
-        if self.reported.insert(about) {
+    fn warn(&mut self, terrain: Entity, about: Entity, text: impl FnOnce() -> String) {
+        if self.reported.insert((terrain, about)) {
             bevy_log::warn!("{}", text());
         }
     }
@@ -425,12 +440,12 @@ impl Follow<'_, '_, '_> {
     fn drop_or_revive(&mut self, key: ChunkKey) {
         let volume = &mut *self.volume;
         let Some(state) = volume.chunks.get(&key) else { return };
-        if matches!(state.fill, Fill::Dropped) {
+        if state.missing > 0 && state.wanted == Wanted::Mesh && (!state.drawn || state.stale) {
+            volume.revive_around(key);
+        } else if matches!(state.fill, Fill::Dropped) {
             if volume.streaming.ranges.wants_samples(key.position) {
                 volume.revive(key);
             }
-        } else if state.missing > 0 && state.wanted == Wanted::Mesh && (!state.drawn || state.stale) {
-            volume.revive_around(key);
         } else if volume.may_drop(key) && volume.streaming.ranges.may_drop_samples(key.position) {
             volume.grid.unload(key.position);
             volume.shown.unload(key.position);
@@ -454,6 +469,8 @@ struct Asked {
 impl TerrainVolume {
     /// Takes in a chunk's samples, `None` where the grid has them already, and the stamps that came before them.
     pub(crate) fn take_samples(&mut self, key: ChunkKey, samples: Option<(Chunk<i16>, Signs)>) {
+        // The samples are there: whoever was to fill them for stamps alone comes too late.
+        self.streaming.take_remote(key.position);
         if let Some((chunk, signs)) = samples {
             self.grid.load(key.position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
             if let Some(state) = self.chunks.get_mut(&key) {
@@ -466,8 +483,14 @@ impl TerrainVolume {
         }
         apply_waiting_stamps(self, key.position);
         self.set_filled(key);
-        // Nothing that reads these samples has been drawn: chunks are meshed once all around them are filled.
-        self.grid.take_dirty();
+        // What has not been drawn is meshed once all around it is filled.
+        let is_drawn = |position: &[i32; 3]| {
+            self.chunks
+                .get(&ChunkKey::finest(*position))
+                .is_some_and(|state| state.drawn && state.wanted == Wanted::Mesh)
+        };
+        let changed = self.grid.take_dirty().into_iter().filter(is_drawn).collect();
+        self.add_changed(changed, None);
     }
 
     /// Whether samples could be filled again, and nothing reads them for now.
@@ -476,7 +499,10 @@ impl TerrainVolume {
         self.chunks.get(&key).is_some_and(|state| state.is_filled())
             && matches!(self.grid.chunk(key.position), Some(Chunk::Samples(_)))
             && !self.edited.contains(&key.position)
-            && key.around().all(|near| self.chunks.get(&near).is_some_and(is_done) && !self.claims.contains_key(&near))
+            && key
+                .around()
+                .filter(|near| self.grid.bounds().is_none_or(|bounds| bounds.contains(near.position)))
+                .all(|near| self.chunks.get(&near).is_some_and(is_done) && !self.claims.contains_key(&near))
             && !self.pending.iter().any(|pending| pending.chunks.contains(&key))
     }
 

@@ -51,6 +51,14 @@ impl Range {
         self.radii.into_iter().fold(0.0, f64::max)
     }
 
+    pub(crate) const fn middle(&self) -> [f64; 3] {
+        self.middle
+    }
+
+    pub(crate) const fn extent(&self) -> Region {
+        self.extent
+    }
+
     /// How many chunks the box around it has, or a little more.
     pub(crate) fn box_size(&self) -> f64 {
         let size = self.extent.size();

@@ -105,7 +105,7 @@ pub(crate) fn take_filled_chunks(
                 volume.streaming.job_is_over();
                 volume.take_samples(key, Some((chunk, signs)));
             }
-            None if is_remote => {
+            None if is_remote && volume.grid.chunk(position).is_none() => {
                 volume.grid.load(position, chunk).expect("stamps wait within the extent only");
                 apply_waiting_stamps(volume, position);
                 volume.grid.take_dirty();

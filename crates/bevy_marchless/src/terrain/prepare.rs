@@ -80,7 +80,7 @@ fn refill(terrain: &Terrain, volume: &mut TerrainVolume) {
         state.fill = Fill::Unasked;
         state.signs = Signs::UNKNOWN;
         state.missing = key.around().filter(|near| extent.contains(near.position)).count() as u8;
-        state.stale = state.drawn;
+        state.stale = state.drawn && !state.hidden;
     }
     let all: Vec<ChunkKey> = volume.chunks.keys().copied().collect();
     volume.streaming.refill(all.into_iter());
@@ -96,8 +96,8 @@ pub(crate) fn forget_despawned_chunk(
     let Ok(mut volume) = volumes.get_mut(chunk.terrain) else { return };
     let key = ChunkKey { level: chunk.level, position: chunk.position.to_array() };
     if let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.entity == Some(removed.entity)) {
-        state.entity = None;
-        state.hidden = true;
+        (state.entity, state.hidden) = (None, true);
+        (state.drawn, state.empty, state.stale) = (true, true, false);
     }
 }
 

@@ -274,12 +274,9 @@ impl TerrainVolume {
         self.pending.push(Pending { chunks, since });
     }
 
-    /// Notes that chunks of the finest level have changed: those of them that are drawn, or will be.
+    /// Notes that chunks of the finest level have changed. Those that are not to be drawn may be by the time the others are.
     pub(crate) fn add_changed(&mut self, changed: BTreeSet<[i32; 3]>, since: Option<Since>) {
-        let keys = changed.into_iter().map(ChunkKey::finest);
-        let is_leaf = |key: &ChunkKey| self.chunks.get(key).is_some_and(|state| state.wanted == Wanted::Mesh);
-        let chunks = keys.filter(is_leaf).collect();
-        self.add_pending(chunks, since);
+        self.add_pending(changed.into_iter().map(ChunkKey::finest).collect(), since);
     }
 
     /// Notes that a chunk has its samples, and finds which chunks can now be meshed.
@@ -390,7 +387,7 @@ impl ChunkState {
 
     /// Whether it can be meshed, and what is drawn of it is not up to date.
     pub(crate) fn is_ready(&self) -> bool {
-        self.wanted == Wanted::Mesh && self.missing == 0 && (!self.drawn || self.stale)
+        self.wanted == Wanted::Mesh && self.missing == 0 && !self.hidden && (!self.drawn || self.stale)
     }
 
     const fn leaf_state(&self) -> LeafState {

@@ -39,7 +39,7 @@ pub enum Leg {
 /// Any part of a flight.
 pub fn leg() -> impl Strategy<Value = Leg> {
     let viewer = || 0usize..3;
-    let turn = (0.0f32..6.283, -0.4f32..0.4, prop_oneof![0.02f32..0.3, 0.3f32..1.5]);
+    let turn = (0.0f32..6.2, -0.4f32..0.4, prop_oneof![0.02f32..0.3, 0.3f32..1.5]);
     let fly = (viewer(), turn, 1u32..16).prop_map(|(viewer, (yaw, pitch, speed), updates)| {
         let step = Quat::from_rotation_y(yaw) * Quat::from_rotation_x(pitch) * Vec3::NEG_Z * speed;
         Leg::Fly { viewer, step, updates }
