@@ -85,7 +85,7 @@ fn viewers_that_look_nowhere() {
         let mut flight = settled_flight();
         let viewer = flight.viewers[0];
         nothing_is_lost_while::<Transform>(&mut flight, viewer, "a viewer that looks nowhere", |transform| {
-            *transform = bad
+            *transform = bad;
         });
     }
 }
