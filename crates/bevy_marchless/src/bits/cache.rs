@@ -55,6 +55,11 @@ impl BitsCache {
         self.lock().clear();
     }
 
+    /// Forgets the bits of a chunk whose samples are gone.
+    pub(crate) fn forget(&self, position: [i32; 3]) {
+        self.lock().remove(&position);
+    }
+
     /// Where the bits of a chunk with these samples are, or will be.
     fn place(&self, position: [i32; 3], samples: &Arc<ChunkSamples<i16>>, recipe: Recipe) -> Arc<OnceLock<Derived>> {
         let mut entries = self.lock();

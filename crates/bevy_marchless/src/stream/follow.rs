@@ -415,6 +415,7 @@ impl Follow<'_, '_, '_> {
                 self.volume.set_unfilled(key);
                 if !self.volume.edited.contains(&key.position) {
                     self.volume.grid.unload(key.position);
+                    self.volume.bits.forget(key.position);
                 }
             }
             Fill::Dropped => {}
@@ -449,6 +450,7 @@ impl Follow<'_, '_, '_> {
         } else if volume.may_drop(key) && volume.streaming.ranges.may_drop_samples(key.position) {
             volume.grid.unload(key.position);
             volume.shown.unload(key.position);
+            volume.bits.forget(key.position);
             if let Some(state) = volume.chunks.get_mut(&key) {
                 state.fill = Fill::Dropped;
             }
