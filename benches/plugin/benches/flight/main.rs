@@ -61,7 +61,8 @@ fn main() -> ExitCode {
 }
 
 fn request(arguments: impl Iterator<Item = String>) -> Result<Request, String> {
-    let mut request = Request { seconds: 20, minutes: None, test: false, word: None };
+    // As criterion does: without `cargo bench`, only whether it runs.
+    let mut request = Request { seconds: 20, minutes: None, test: true, word: None };
     let mut arguments = arguments.peekable();
     while let Some(argument) = arguments.next() {
         let mut number = || {
@@ -72,7 +73,7 @@ fn request(arguments: impl Iterator<Item = String>) -> Result<Request, String> {
             "--seconds" => request.seconds = number()?.max(1),
             "--minutes" => request.minutes = Some(number()?.max(1)),
             "--test" => request.test = true,
-            "--bench" => {}
+            "--bench" => request.test = false,
             word if !word.starts_with('-') => request.word = Some(word.to_owned()),
             _ => return Err(format!("unknown: {argument}; there are --seconds N, --minutes N, --test and a word")),
         }
