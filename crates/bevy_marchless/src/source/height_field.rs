@@ -1,10 +1,14 @@
 //! Height fields: one height per column, turned into distances and materials.
 
+#[cfg(feature = "png")]
 use marchless::{Bound, SourceRegion};
 
+#[cfg(feature = "png")]
 use super::strata::{Stratum, material_at, material_within};
+#[cfg(feature = "png")]
 use super::{ROOM, rows, world_box};
 
+#[cfg(feature = "png")]
 /// A height for each column, in world units.
 pub(crate) trait HeightField {
     /// The height of the ground at a position.
@@ -30,6 +34,7 @@ impl Column {
     }
 }
 
+#[cfg(feature = "png")]
 /// The ground of each column of a region, x fastest. Each height is evaluated once; slopes are central differences, and
 /// so depend on nothing but the column's position and the spacing.
 pub(crate) fn columns(field: &impl HeightField, region: &SourceRegion) -> Vec<Column> {
@@ -49,6 +54,7 @@ pub(crate) fn columns(field: &impl HeightField, region: &SourceRegion) -> Vec<Co
         .collect()
 }
 
+#[cfg(feature = "png")]
 /// [`Source::fill`](marchless::Source::fill) of a height field.
 pub(crate) fn fill(
     field: &impl HeightField,
@@ -72,6 +78,7 @@ pub(crate) fn fill(
     }
 }
 
+#[cfg(feature = "png")]
 /// [`Source::bound`](marchless::Source::bound) of a height field.
 pub(crate) fn bound(field: &impl HeightField, strata: &[Stratum], region: &SourceRegion) -> Bound {
     let [x, [bottom, top], z] = world_box(region);

@@ -46,11 +46,13 @@ impl Stratum {
     }
 }
 
+#[cfg(any(feature = "png", test))]
 /// The material of solid ground at a depth, a height and under a slope.
 pub(crate) fn material_at(strata: &[Stratum], depth: f64, height: f64, slope: f64) -> u8 {
     strata.iter().find(|stratum| stratum.holds(depth, height, slope)).map_or(0, |stratum| stratum.material)
 }
 
+#[cfg(any(feature = "png", test))]
 /// The one material of all ground between two depths and two heights, under whatever slope; none where it may differ.
 pub(crate) fn material_within(strata: &[Stratum], depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
     let mut possible = None;
