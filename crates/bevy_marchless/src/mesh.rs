@@ -171,7 +171,7 @@ impl Start<'_, '_, '_> {
             let (ranges, chunks) = (volume.streaming.ranges(), &volume.chunks);
             ready.retain(|key| chunks.get(key).is_some_and(ChunkState::is_ready));
             // Those that come first are at the end.
-            ready.sort_by_cached_key(|key| (Reverse(ranges.urgency(key.position)), *key));
+            ready.sort_by_cached_key(|key| Reverse((ranges.urgency(key.position), *key)));
             ready.dedup();
         }
         let mut no_longer_drawn = BTreeSet::new();

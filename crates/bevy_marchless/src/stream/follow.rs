@@ -108,7 +108,7 @@ impl Streaming {
     fn sort(&mut self) {
         let ranges = &self.ranges;
         self.arriving.retain(|key| ranges.wanted(key.position, Wanted::Samples) > Wanted::Gone);
-        self.arriving.sort_by_cached_key(|key| (Reverse(ranges.urgency(key.position)), *key));
+        self.arriving.sort_by_cached_key(|key| Reverse((ranges.urgency(key.position), *key)));
         self.arriving.dedup();
         self.to_fill_is_sorted = false;
     }
@@ -571,7 +571,7 @@ pub(crate) fn ask_for_samples(
             let (ranges, chunks) = (&streaming.ranges, &volume.chunks);
             let waits = |key: &ChunkKey| chunks.get(key).is_some_and(|state| matches!(state.fill, Fill::Waiting));
             streaming.to_fill.retain(waits);
-            streaming.to_fill.sort_by_cached_key(|key| (Reverse(ranges.urgency(key.position)), *key));
+            streaming.to_fill.sort_by_cached_key(|key| Reverse((ranges.urgency(key.position), *key)));
             streaming.to_fill.dedup();
             streaming.to_fill_is_sorted = true;
         }
