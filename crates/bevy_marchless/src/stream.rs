@@ -21,6 +21,7 @@
 //! ```
 
 mod follow;
+mod look;
 mod range;
 
 use core::time::Duration;

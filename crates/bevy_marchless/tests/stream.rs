@@ -2,40 +2,10 @@
 
 mod common;
 
-use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 use common::*;
-
-/// Waves without end, known to be empty far above and below.
-struct Waves;
-
-impl Source for Waves {
-    fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
-        let height = |[x, y, z]: [f64; 3]| y - 6.0 * (x * 0.1).sin() * (z * 0.07).cos();
-        height.fill(region, distances, materials);
-    }
-
-    fn bound(&self, region: &SourceRegion) -> Bound {
-        let (bottom, top) = (region.min[1], region.min[1] + region.size[1] as i32);
-        if bottom > 6 {
-            Bound::Outside
-        } else if top < -6 {
-            Bound::Inside { material: 0 }
-        } else {
-            Bound::Mixed
-        }
-    }
-}
-
-fn world() -> Terrain {
-    Terrain::endless(Waves).with_chunk_cells(8)
-}
-
-fn move_to(app: &mut bevy_app::App, viewer: Entity, to: Vec3) {
-    app.world_mut().get_mut::<Transform>(viewer).unwrap().translation = to;
-}
 
 #[test]
 fn what_a_viewer_sees_is_loaded_and_goes_when_it_leaves() {

@@ -5,7 +5,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use bevy_math::{DAffine3, Vec3};
 use bevy_platform::collections::{HashMap, HashSet};
 use bevy_platform::time::Instant;
 use bevy_tasks::AsyncComputeTaskPool;
@@ -13,6 +12,7 @@ use bevy_transform::components::GlobalTransform;
 use bevy_transform::helper::TransformHelper;
 use marchless::{Chunk, Region, Source};
 
+use super::look::Look;
 use super::range::{Range, Ranges, Viewed, Wanted};
 use super::{StreamStats, TerrainViewer};
 use crate::brush::apply_waiting_stamps;
@@ -20,13 +20,9 @@ use crate::chunk::ChunkKey;
 use crate::place::{Place, in_double_precision};
 use crate::schedule::MarchlessSettings;
 use crate::stats::MainThread;
-use crate::terrain::{ChunkState, Fill, FillResults, Signs, Terrain, TerrainVolume, fill_chunk};
+use crate::terrain::{ChunkState, Fill, FillResults, Signs, TerrainVolume, fill_chunk};
 use crate::work::{Ticket, WorkQueue};
 
-/// Viewers' positions are rounded to this part of a chunk, so that small steps change nothing.
-const STEP: f64 = 1.0 / 8.0;
-/// No viewer sees farther, in voxels.
-const FARTHEST: f64 = 1e9;
 /// Chunks per axis of the boxes that the source bounds at once.
 const BOX: i32 = 4;
 /// Bounds of so many boxes are remembered.
@@ -207,114 +203,6 @@ pub(crate) fn follow_viewers(
         }
     }
     main_thread.stop(start);
-}
-
-/// Finding the ranges around one terrain's viewers.
-struct Look<'a> {
-    terrain: &'a Terrain,
-    /// From world space to the terrain's own.
-    to_terrain: Option<DAffine3>,
-    /// What has been warned of.
-    reported: &'a mut HashSet<(Entity, Entity)>,
-}
-
-impl Look<'_> {
-    /// What a viewer sees; `None` where that cannot be said.
-    fn at(
-        &mut self,
-        terrain: Entity,
-        viewer: Entity,
-        settings: &TerrainViewer,
-        place: &GlobalTransform,
-        known: Option<(TerrainViewer, Viewed)>,
-    ) -> Option<Viewed> {
-        let Some(to_terrain) = self.to_terrain.filter(|to_terrain| to_terrain.is_finite()) else {
-            self.warn(terrain, terrain, || {
-                format!("terrain {terrain} cannot be followed: its transform has no inverse")
-            });
-            return None;
-        };
-        let cells = f64::from(self.terrain.chunk_cells);
-        let position = place.translation();
-        let at = to_terrain.transform_point3(position.as_dvec3()) / (f64::from(self.terrain.voxel_size) * cells);
-        let at = at.to_array();
-        // Not `min`, which would make a number of what is none.
-        let radii = settings.radii.as_dvec3().to_array().map(|v| if v > FARTHEST { FARTHEST } else { v } / cells);
-        let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
-        if !at.iter().all(|v| v.is_finite()) {
-            self.warn(terrain, viewer, || {
-                format!("terrain viewer {viewer} has no finite position ({position}); it loads nothing new")
-            });
-            return None;
-        }
-        // Not a number is not above 0 either.
-        if !(radii.iter().all(|radius| *radius > 0.0) && margin >= 0.0 && samples >= 0.0) {
-            let TerrainViewer { radii, margin, sample_radius } = settings;
-            self.warn(terrain, viewer, || {
-                format!(
-                    "terrain viewer {viewer} needs radii above 0 and a margin and a sample radius of 0 or more, in voxels, \
-                     but has {radii}, {margin} and {sample_radius}; it loads nothing new"
-                )
-            });
-            return None;
-        }
-        let middle = at.map(|v| (v / STEP).round() * STEP);
-        let extent = self.terrain.chunk_region();
-        // In steps, so that looking around changes little.
-        let forward = place.affine().transform_vector3(Vec3::NEG_Z).as_dvec3();
-        let forward = to_terrain.transform_vector3(forward).normalize_or_zero();
-        let forward = (forward * 2.0).round().to_array();
-        if let Some((as_before, viewed)) = known
-            && (as_before, viewed.range.middle(), viewed.range.extent()) == (*settings, middle, extent)
-        {
-            return Some(Viewed { forward, ..viewed });
-        }
-        let whole = Range::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
-        let range = limited(whole);
-        if range == whole {
-            self.reported.remove(&(terrain, viewer));
-        } else {
-            self.warn(terrain, viewer, || {
-                format!(
-                    "terrain viewer {viewer} asks for more than {} chunks with radii of {} voxels; they are scaled down",
-                    Terrain::MAX_CHUNKS,
-                    settings.radii
-                )
-            });
-        }
-        let margin = limited_margin(&range, margin);
-        // Where all that may be loaded lies within, none are dropped.
-        let drops = samples < range.longest() + margin + 2.0;
-        let samples = drops.then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
-        Some(Viewed { range, margin, samples, forward })
-    }
-
-    fn warn(&mut self, terrain: Entity, about: Entity, text: impl FnOnce() -> String) {
-        if self.reported.insert((terrain, about)) {
-            bevy_log::warn!("{}", text());
-        }
-    }
-}
-
-/// The range, made smaller until it has no more chunks than may be loaded.
-fn limited(mut range: Range) -> Range {
-    // First by the box around it: rows of a huge range would take too long to count.
-    while range.box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
-        range = range.shrunk(0.9);
-    }
-    while range.box_size() > Terrain::MAX_CHUNKS as f64 && range.grown(0.0).len() > Terrain::MAX_CHUNKS {
-        range = range.shrunk(0.97);
-    }
-    range
-}
-
-/// The margin, made smaller until the range with it has no more than a few times the chunks that may be loaded.
-fn limited_margin(range: &Range, margin: f64) -> f64 {
-    let mut margin = margin.min(FARTHEST);
-    while margin > 0.1 && range.widened(margin).box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
-        margin *= 0.9;
-    }
-    margin
 }
 
 /// Letting the chunks of one terrain follow.

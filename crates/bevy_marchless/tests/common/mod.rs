@@ -15,6 +15,7 @@ use bevy_marchless::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_mesh::{Mesh, MeshPlugin};
 use bevy_transform::TransformPlugin;
+use bevy_transform::components::Transform;
 use marchless::{MeshBuffer, MeshReport};
 
 /// What `MinimalPlugins` and `TransformPlugin` bring, and the plugin. Jobs run on threads.
@@ -174,4 +175,34 @@ impl Gate {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
+}
+
+/// Waves without end, known to be empty far above and below.
+pub struct Waves;
+
+impl Source for Waves {
+    fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+        let height = |[x, y, z]: [f64; 3]| y - 6.0 * (x * 0.1).sin() * (z * 0.07).cos();
+        height.fill(region, distances, materials);
+    }
+
+    fn bound(&self, region: &SourceRegion) -> Bound {
+        let (bottom, top) = (region.min[1], region.min[1] + region.size[1] as i32);
+        if bottom > 6 {
+            Bound::Outside
+        } else if top < -6 {
+            Bound::Inside { material: 0 }
+        } else {
+            Bound::Mixed
+        }
+    }
+}
+
+/// A world of them, in chunks of 8 voxels.
+pub fn world() -> Terrain {
+    Terrain::endless(Waves).with_chunk_cells(8)
+}
+
+pub fn move_to(app: &mut App, viewer: Entity, to: Vec3) {
+    app.world_mut().get_mut::<Transform>(viewer).unwrap().translation = to;
 }
