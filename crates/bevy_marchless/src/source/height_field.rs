@@ -24,13 +24,28 @@ pub(crate) struct Column {
     /// World units.
     pub(crate) height: f64,
     /// Rise per run, 0 or more.
+    #[cfg(feature = "png")]
     pub(crate) slope: f64,
+    /// How much of the way out of the ground leads up: what heights above it are multiplied with.
+    pub(crate) up: f64,
 }
 
 impl Column {
+    /// Of the heights of the columns before and behind it, along x and z, `run` world units apart from each other.
+    pub(crate) fn new(height: f64, along_x: [f64; 2], along_z: [f64; 2], run: f64) -> Self {
+        let [x, z] = [along_x, along_z].map(|[before, behind]| (behind - before) / run);
+        let square = x * x + z * z;
+        Self {
+            height,
+            #[cfg(feature = "png")]
+            slope: square.sqrt(),
+            up: 1.0 / (1.0 + square).sqrt(),
+        }
+    }
+
     /// The distance to the ground of a point `above` world units over it, taking the ground for a slope that goes on.
     pub(crate) fn distance(self, above: f64) -> f64 {
-        above / (1.0 + self.slope * self.slope).sqrt()
+        above * self.up
     }
 }
 
@@ -47,9 +62,8 @@ pub(crate) fn columns(field: &impl HeightField, region: &SourceRegion) -> Vec<Co
     (0..nz)
         .flat_map(|z| (0..nx).map(move |x| x + 1 + width * (z + 1)))
         .map(|index| {
-            let along_x = (heights[index + 1] - heights[index - 1]) / run;
-            let along_z = (heights[index + width] - heights[index - width]) / run;
-            Column { height: heights[index], slope: (along_x * along_x + along_z * along_z).sqrt() }
+            let [along_x, along_z] = [1, width].map(|step| [heights[index - step], heights[index + step]]);
+            Column::new(heights[index], along_x, along_z, run)
         })
         .collect()
 }

@@ -174,13 +174,14 @@ impl Source for Landscape {
         let mut body = Part::new(&self.compiled.body, samples, &region, &columns);
         let xs: Vec<f64> = (0..samples.size[0]).map(|x| samples.position([x, 0, 0])[0]).collect();
         let mut row = Row::new(width);
+        let spacing = samples.spacing as f32;
         let mut rules = self.compiled.rules.for_rows(&xs);
         for (index, distances, materials) in rows(samples, distances, materials) {
             let [_, y, z] = samples.position([0, index[0], index[1]]);
-            let line = Line { index, xs: &xs, y, z, room: region.room(), reach: region.reach };
+            let line = Line { index, xs: &xs, y, z, room: region.room() as f32, reach: region.reach as f32 };
             body.evaluate(&line, 0..width, &mut row, &mut calls);
             for (distance, sample) in distances.iter_mut().zip(&row.distance) {
-                *distance = ((sample / samples.spacing) as f32).clamp(f32::MIN, f32::MAX);
+                *distance = (sample / spacing).clamp(f32::MIN, f32::MAX);
             }
             rules.give(&line, &row, materials, &mut calls);
         }

@@ -2,7 +2,10 @@
 
 use super::Fractal;
 use super::interval::Interval;
-use super::perlin::{LIPSCHITZ_2D, LIPSCHITZ_3D, NoiseRow, Perlin};
+use super::perlin::{LIPSCHITZ_2D, LIPSCHITZ_3D, NoiseRow, Perlin, Share};
+
+/// The noise may be as far off, for it is rounded to `f32`.
+const ROUNDING: f64 = 1e-6;
 
 /// One octave of a [`Fractal`].
 #[derive(Clone)]
@@ -65,24 +68,14 @@ impl Octaves {
     /// Noise, from −1 to 1, and its gradient per world unit at each x of a row at `y`, `z`.
     pub(crate) fn row_3d(&self, xs: &[f64], y: f64, z: f64, row: &mut NoiseRow) -> u64 {
         row.reset(xs.len());
-        let NoiseRow { value: values, gradient: [by_x, by_y, by_z] } = row;
-        let (values, by_x, by_y, by_z) =
-            (&mut values[..xs.len()], &mut by_x[..xs.len()], &mut by_y[..xs.len()], &mut by_z[..xs.len()]);
-        let mut places = vec![0.0; xs.len()];
         for octave in &self.octaves {
-            octave.places(xs, &mut places);
-            let slope = octave.amplitude * octave.frequency;
-            octave.perlin.row_3d(&places, octave.place(y), octave.place(z), |index, value, gradient| {
-                let (value, slope) = if self.ridged {
-                    (1.0 - 2.0 * value.abs(), if value < 0.0 { 2.0 * slope } else { -2.0 * slope })
-                } else {
-                    (value, slope)
-                };
-                values[index] += octave.amplitude * value;
-                by_x[index] += slope * gradient[0];
-                by_y[index] += slope * gradient[1];
-                by_z[index] += slope * gradient[2];
-            });
+            octave.places(xs, &mut row.places);
+            let share = Share {
+                value: octave.amplitude as f32,
+                gradient: (octave.amplitude * octave.frequency) as f32,
+                ridged: self.ridged,
+            };
+            octave.perlin.add_row_3d(octave.place(y), octave.place(z), share, row);
         }
         self.calls(xs.len())
     }
@@ -104,7 +97,7 @@ impl Octaves {
                     [x, z] => octave.perlin.row_2d(&[octave.place(*x)], octave.place(*z), |_, v| value = v),
                     [x, y, z] => {
                         let [x, y, z] = [*x, *y, *z].map(|v| octave.place(v));
-                        octave.perlin.row_3d(&[x], y, z, |_, v, _| value = v);
+                        value = octave.perlin.value_3d(x, y, z);
                     }
                     _ => {}
                 }
@@ -115,12 +108,12 @@ impl Octaves {
             let values = if self.ridged { values.abs().scaled(-2.0).plus(Interval::exactly(1.0)) } else { values };
             sum = sum.plus(values.scaled(octave.amplitude));
         }
-        (sum.widened(1e-9), calls)
+        (Interval { low: sum.low - ROUNDING, high: sum.high + ROUNDING }, calls)
     }
 
     /// Between which values the noise lies everywhere.
     pub(crate) fn range(&self) -> Interval {
-        Interval { low: -1.0, high: 1.0 }.widened(1e-9)
+        Interval { low: -1.0 - ROUNDING, high: 1.0 + ROUNDING }
     }
 
     /// How much the noise typically changes per world unit.

@@ -73,9 +73,8 @@ impl Columns {
         let indices = (0..nz).flat_map(|z| (0..nx).map(move |x| x + 1 + width * (z + 1)));
         indices
             .map(|index| {
-                let along_x = (heights[index + 1] - heights[index - 1]) / run;
-                let along_z = (heights[index + width] - heights[index - width]) / run;
-                Column { height: heights[index], slope: (along_x * along_x + along_z * along_z).sqrt() }
+                let [along_x, along_z] = [1, width].map(|step| [heights[index - step], heights[index + step]]);
+                Column::new(heights[index], along_x, along_z, run)
             })
             .collect()
     }

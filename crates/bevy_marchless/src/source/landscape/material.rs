@@ -121,7 +121,7 @@ impl Rules {
 
     /// The rules for rows of these coordinates along x. Units: world.
     pub(super) fn for_rows<'a>(&'a self, xs: &'a [f64]) -> RowRules<'a> {
-        RowRules { rules: &self.rules, xs, noise: self.rules.iter().map(|_| (false, NoiseRow::default())).collect() }
+        RowRules { rules: &self.rules, xs, chosen: vec![AIR; xs.len()], noise: NoiseRow::default() }
     }
 }
 
@@ -129,47 +129,62 @@ impl Rules {
 pub(super) struct RowRules<'a> {
     rules: &'a [Rule],
     xs: &'a [f64],
-    /// The noise of each rule, and whether it is that of the row at hand.
-    noise: Vec<(bool, NoiseRow)>,
+    /// Each sample's material, [`UNDECIDED`] or [`AIR`].
+    chosen: Vec<i32>,
+    noise: NoiseRow,
 }
+
+/// A sample for which no rule has held yet.
+const UNDECIDED: i32 = -1;
+
+/// A sample without a material.
+const AIR: i32 = -2;
 
 impl RowRules<'_> {
     /// Gives the solid samples of a row their materials.
     pub(super) fn give(&mut self, line: &Line, row: &Row, materials: &mut [u8], calls: &mut u64) {
-        self.noise.iter_mut().for_each(|(evaluated, _)| *evaluated = false);
-        for (index, material) in materials.iter_mut().enumerate() {
-            let (distance, up) = (row.distance[index], row.up[index]);
-            if distance >= 0.0 || distance.is_nan() {
+        // Loops over numbers of one width, without branches: so they are turned into vector instructions.
+        let len = materials.len();
+        let (distances, ups, matters) = (&row.distance[..len], &row.up[..len], &row.matter[..len]);
+        let chosen = &mut self.chosen[..len];
+        for index in 0..len {
+            let given = if matters[index] == BY_RULES { UNDECIDED } else { i32::from(matters[index]) };
+            chosen[index] = if distances[index] < 0.0 { given } else { AIR };
+        }
+        for Rule { stratum, patches } in self.rules {
+            if !chosen.contains(&UNDECIDED) {
+                break;
+            }
+            if line.y < stratum.above_height {
                 continue;
             }
-            *material = match u8::try_from(row.matter[index]) {
-                Ok(material) => material,
-                Err(_) => {
-                    let slope = if up > 0.0 { (1.0 - up * up).max(0.0).sqrt() / up } else { f64::INFINITY };
-                    self.material(index, -distance, line, slope, calls)
-                }
+            // Slopes are told by how much of the way out of the ground leads up.
+            let steeper = stratum.steeper_than;
+            let most_up = if steeper <= 0.0 { f32::INFINITY } else { (1.0 / (1.0 + steeper * steeper).sqrt()) as f32 };
+            let highest = -stratum.below_depth as f32;
+            let material = i32::from(stratum.material);
+            let holds = |index: usize, chosen: i32| {
+                (chosen == UNDECIDED) & (distances[index] <= highest) & (ups[index] <= most_up)
             };
-        }
-        debug_assert!(row.matter.iter().all(|matter| *matter <= BY_RULES));
-    }
-
-    fn material(&mut self, index: usize, depth: f64, line: &Line, slope: f64, calls: &mut u64) -> u8 {
-        let (rules, xs) = (self.rules, self.xs);
-        for (rule, (evaluated, noise)) in rules.iter().zip(&mut self.noise) {
-            if !rule.stratum.holds(depth, line.y, slope) {
+            if let Some((octaves, above)) = patches {
+                if (0..len).any(|index| holds(index, chosen[index])) {
+                    *calls += octaves.row_3d(self.xs, line.y, line.z, &mut self.noise);
+                    for (index, chosen) in chosen.iter_mut().enumerate() {
+                        if holds(index, *chosen) && f64::from(self.noise.value[index]) > *above {
+                            *chosen = material;
+                        }
+                    }
+                }
                 continue;
             }
-            if let Some((octaves, above)) = &rule.patches {
-                if !*evaluated {
-                    *calls += octaves.row_3d(xs, line.y, line.z, noise);
-                    *evaluated = true;
-                }
-                if noise.value[index] <= *above {
-                    continue;
-                }
+            for index in 0..len {
+                chosen[index] = if holds(index, chosen[index]) { material } else { chosen[index] };
             }
-            return rule.stratum.material;
         }
-        0
+        for (material, chosen) in materials.iter_mut().zip(chosen) {
+            if *chosen != AIR {
+                *material = (*chosen).max(0) as u8;
+            }
+        }
     }
 }

@@ -15,9 +15,9 @@ use crate::source::perlin::NoiseRow;
 #[derive(Clone)]
 pub(super) struct Row {
     /// Units: world.
-    pub(super) distance: Vec<f64>,
+    pub(super) distance: Vec<f32>,
     /// How much of the way out of the surface leads up: 1 on a floor, 0 at a wall, −1 under a ceiling.
-    pub(super) up: Vec<f64>,
+    pub(super) up: Vec<f32>,
     /// The material, or [`BY_RULES`].
     pub(super) matter: Vec<u16>,
 }
@@ -31,9 +31,9 @@ pub(super) struct Line<'a> {
     pub(super) y: f64,
     pub(super) z: f64,
     /// As of [`Region::room`].
-    pub(super) room: f64,
+    pub(super) room: f32,
     /// As of [`Region::reach`].
-    pub(super) reach: f64,
+    pub(super) reach: f32,
 }
 
 /// A [`Body`] made ready for one region: what cannot matter there is left out.
@@ -43,7 +43,7 @@ pub(super) enum Part<'a> {
     Noise(Box<Samples<'a>>),
     Shape(Sdf),
     Union { parts: Vec<Part<'a>>, row: Row },
-    Cut { parts: Vec<Part<'a>>, sign: f64, row: Row },
+    Cut { parts: Vec<Part<'a>>, sign: f32, row: Row },
 }
 
 impl Row {
@@ -51,10 +51,11 @@ impl Row {
         Self { distance: vec![0.0; len], up: vec![0.0; len], matter: vec![BY_RULES; len] }
     }
 
-    fn set(&mut self, index: usize, distance: f64, up: f64) {
-        self.distance[index] = distance;
-        self.up[index] = up;
-        self.matter[index] = BY_RULES;
+    /// The same for all samples in `range`, of the material that the rules give.
+    fn fill(&mut self, range: Range<usize>, distance: f32, up: f32) {
+        self.distance[range.clone()].fill(distance);
+        self.up[range.clone()].fill(up);
+        self.matter[range].fill(BY_RULES);
     }
 }
 
@@ -82,21 +83,24 @@ impl<'a> Part<'a> {
                 };
                 let parts = parts.iter().enumerate().filter(cuts);
                 let parts = parts.map(|(_, part)| Self::new(part, samples, region, columns)).collect();
-                Self::Cut { parts, sign: *sign, row: row() }
+                Self::Cut { parts, sign: *sign as f32, row: row() }
             }
         }
     }
 
     /// Evaluates the samples of a row that lie in `range`. Each depends on nothing but its position.
+    ///
+    /// Loops over samples are written out, over slices of one length: so they are turned into vector instructions.
     pub(super) fn evaluate(&mut self, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
         match self {
-            Self::Everything => range.for_each(|index| out.set(index, f64::NEG_INFINITY, 1.0)),
+            Self::Everything => out.fill(range, f32::NEG_INFINITY, 1.0),
             Self::Ground(columns) => {
-                let columns = &columns[line.xs.len() * line.index[1] as usize..];
-                for index in range {
-                    let column = &columns[index];
-                    let up = 1.0 / (1.0 + column.slope * column.slope).sqrt();
-                    out.set(index, column.distance(line.y - column.height), up);
+                let columns = &columns[line.xs.len() * line.index[1] as usize..][range.clone()];
+                out.matter[range.clone()].fill(BY_RULES);
+                let (distances, ups) = (&mut out.distance[range.clone()], &mut out.up[range]);
+                for ((column, distance), up) in columns.iter().zip(distances).zip(ups) {
+                    *distance = column.distance(line.y - column.height) as f32;
+                    *up = column.up as f32;
                 }
             }
             Self::Noise(samples) => samples.evaluate(line, range, out, calls),
@@ -104,14 +108,14 @@ impl<'a> Part<'a> {
                 for index in range {
                     let position = DVec3::new(line.xs[index], line.y, line.z);
                     let (distance, material) = shape.sample(position);
-                    out.distance[index] = distance;
+                    out.distance[index] = distance as f32;
                     out.matter[index] = u16::from(material);
                     // As of a wall: a shape's own samples need no slope, and what it cuts has walls most of all.
                     out.up[index] = 0.0;
                 }
             }
             Self::Union { parts, row } => {
-                range.clone().for_each(|index| out.set(index, f64::INFINITY, 1.0));
+                out.fill(range.clone(), f32::INFINITY, 1.0);
                 for part in parts {
                     part.evaluate(line, range.clone(), row, calls);
                     for index in range.clone() {
@@ -126,7 +130,7 @@ impl<'a> Part<'a> {
             }
             Self::Cut { parts, sign, row } => {
                 let Some((first, others)) = parts.split_first_mut() else {
-                    return range.for_each(|index| out.set(index, f64::INFINITY, 1.0));
+                    return out.fill(range, f32::INFINITY, 1.0);
                 };
                 first.evaluate(line, range.clone(), out, calls);
                 for other in others {
@@ -134,13 +138,14 @@ impl<'a> Part<'a> {
                     let Some(start) = range.clone().find(near) else { return };
                     let end = range.clone().rev().find(near).map_or(start, |last| last + 1);
                     other.evaluate(line, start..end, row, calls);
-                    for index in start..end {
-                        let distance = *sign * row.distance[index];
-                        let before = out.distance[index];
-                        if before < line.room && distance > before && distance > -line.reach {
-                            out.distance[index] = distance;
-                            out.up[index] = *sign * row.up[index];
-                        }
+                    let len = end - start;
+                    let (cuts, cut_ups) = (&row.distance[start..end][..len], &row.up[start..end][..len]);
+                    let (distances, ups) = (&mut out.distance[start..end][..len], &mut out.up[start..end][..len]);
+                    for index in 0..len {
+                        let (before, cut) = (distances[index], *sign * cuts[index]);
+                        let is_cut = (before < line.room) & (cut > before) & (cut > -line.reach);
+                        distances[index] = if is_cut { cut } else { before };
+                        ups[index] = if is_cut { *sign * cut_ups[index] } else { ups[index] };
                     }
                 }
             }
@@ -153,127 +158,140 @@ pub(super) struct Samples<'a> {
     noise: &'a Noise,
     /// The noise at the samples of a row.
     rows: [NoiseRow; 2],
+    /// By how much the first noise is too far from 0 for tunnels.
+    too_far: Vec<f32>,
     lattice: Option<Lattice>,
 }
 
 impl<'a> Samples<'a> {
     fn new(noise: &'a Noise, region: &SourceRegion) -> Self {
         let lattice = (noise.lattice > 1).then(|| Lattice::new(noise.lattice, region));
-        Self { noise, rows: Default::default(), lattice }
+        Self { noise, rows: Default::default(), too_far: Vec::new(), lattice }
     }
 
     fn evaluate(&mut self, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
-        let Self { noise, rows: [row, other], lattice } = self;
-        let mut evaluate = |which: usize, range: Range<usize>, row: &mut NoiseRow| {
-            let octaves = match &noise.kind {
-                NoiseKind::Caves { noise, .. } => noise,
-                NoiseKind::Tunnels { noises, .. } => &noises[which],
-            };
-            match lattice {
-                None => *calls += octaves.row_3d(&line.xs[range], line.y, line.z, row),
-                Some(lattice) => lattice.row(which, octaves, line, range, row, calls),
-            }
+        self.noise(0, line, range.clone(), calls);
+        match &self.noise.kind {
+            NoiseKind::Caves { threshold, .. } => self.caves(*threshold as f32, range, out),
+            NoiseKind::Tunnels { width, .. } => self.tunnels(*width as f32, line, range, out, calls),
+        }
+    }
+
+    /// Evaluates one of the noises.
+    fn noise(&mut self, which: usize, line: &Line, range: Range<usize>, calls: &mut u64) {
+        let octaves = match &self.noise.kind {
+            NoiseKind::Caves { noise, .. } => noise,
+            NoiseKind::Tunnels { noises, .. } => &noises[which],
         };
-        evaluate(0, range.clone(), row);
-        let [by_x, by_y, by_z] = &row.gradient;
-        match &noise.kind {
-            NoiseKind::Caves { threshold, .. } => {
-                for (local, index) in range.enumerate() {
-                    let [x, y, z] = [by_x[local], by_y[local], by_z[local]];
-                    let steepness = (x * x + y * y + z * z).sqrt();
-                    let distance = (threshold - row.value[local]) / steepness.max(noise.flattest);
-                    out.set(index, distance, -y / steepness.max(f64::MIN_POSITIVE));
-                }
+        let row = &mut self.rows[which];
+        *calls += match &mut self.lattice {
+            None => octaves.row_3d(&line.xs[range], line.y, line.z, row),
+            Some(lattice) => lattice.row(which, octaves, line.index, range, row),
+        };
+    }
+
+    fn caves(&self, threshold: f32, range: Range<usize>, out: &mut Row) {
+        let (flattest, len) = (self.noise.flattest as f32, range.len());
+        let NoiseRow { value, gradient: [by_x, by_y, by_z], .. } = &self.rows[0];
+        let (value, by_x, by_y, by_z) = (&value[..len], &by_x[..len], &by_y[..len], &by_z[..len]);
+        out.matter[range.clone()].fill(BY_RULES);
+        let (distances, ups) = (&mut out.distance[range.clone()][..len], &mut out.up[range][..len]);
+        for index in 0..len {
+            let steepness = length([by_x[index], by_y[index], by_z[index]]);
+            distances[index] = (threshold - value[index]) / steepness.max(flattest);
+            ups[index] = -by_y[index] / steepness.max(f32::MIN_POSITIVE);
+        }
+    }
+
+    fn tunnels(&mut self, width: f32, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
+        let (flattest, len) = (self.noise.flattest as f32, range.len());
+        // What is far from where the first noise is 0 is far from the tunnels, whatever the other noise is.
+        self.too_far.clear();
+        self.too_far.resize(len, 0.0);
+        let NoiseRow { value, gradient: [by_x, by_y, by_z], .. } = &self.rows[0];
+        let (value, by_x, by_y, by_z) = (&value[..len], &by_x[..len], &by_y[..len], &by_z[..len]);
+        let too_far = &mut self.too_far[..len];
+        for index in 0..len {
+            let steepness = length([by_x[index], by_y[index], by_z[index]]).max(flattest);
+            too_far[index] = value[index].abs() - width - FAR * line.reach * steepness;
+        }
+        out.fill(range.clone(), f32::INFINITY, 1.0);
+        let Some(first) = self.too_far.iter().position(|far| *far < 0.0) else { return };
+        let end = self.too_far.iter().rposition(|far| *far < 0.0).map_or(first, |last| last + 1);
+        self.noise(1, line, range.start + first..range.start + end, calls);
+        let [one, other] = &self.rows;
+        for there in 0..end - first {
+            let here = first + there;
+            if self.too_far[here] >= 0.0 {
+                continue;
             }
-            NoiseKind::Tunnels { width, .. } => {
-                // What is far from where the first noise is 0 is far from the tunnels, whatever the other noise is.
-                let far = |local: usize| {
-                    let [x, y, z] = [by_x[local], by_y[local], by_z[local]];
-                    let steepness = (x * x + y * y + z * z).sqrt().max(noise.flattest);
-                    row.value[local].abs() - width >= FAR * line.reach * steepness
-                };
-                let len = range.len();
-                let start = (0..len).find(|local| !far(*local)).unwrap_or(len);
-                let end = (start..len).rev().find(|local| !far(*local)).map_or(start, |last| last + 1);
-                if start < end {
-                    evaluate(1, range.start + start..range.start + end, other);
-                }
-                for (local, index) in range.enumerate() {
-                    if far(local) {
-                        out.set(index, f64::INFINITY, 1.0);
-                        continue;
-                    }
-                    let there = local - start;
-                    let (a, b) = (row.value[local], other.value[there]);
-                    let length = (a * a + b * b).sqrt();
-                    let [x, y, z] = [0, 1, 2].map(|axis: usize| {
-                        let sum = a * row.gradient[axis][local] + b * other.gradient[axis][there];
-                        sum / length.max(f64::MIN_POSITIVE)
-                    });
-                    let steepness = (x * x + y * y + z * z).sqrt();
-                    let distance = (length - width) / steepness.max(noise.flattest);
-                    out.set(index, distance, y / steepness.max(f64::MIN_POSITIVE));
-                }
-            }
+            let (a, b) = (one.value[here], other.value[there]);
+            let both = (a * a + b * b).sqrt();
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+                let sum = a * one.gradient[axis][here] + b * other.gradient[axis][there];
+                sum / both.max(f32::MIN_POSITIVE)
+            });
+            let steepness = length([x, y, z]);
+            out.distance[range.start + here] = (both - width) / steepness.max(flattest);
+            out.up[range.start + here] = y / steepness.max(f32::MIN_POSITIVE);
         }
     }
 }
 
+#[inline]
+fn length([x, y, z]: [f32; 3]) -> f32 {
+    (x * x + y * y + z * z).sqrt()
+}
+
 /// So many times their reach away, as the first of two noises tells, tunnels are not looked for.
-const FAR: f64 = 1.5;
+const FAR: f32 = 1.5;
 
 /// Noise at every n-th lattice point, each row of it evaluated when it is first needed.
 struct Lattice {
-    every: i64,
-    /// The lowest sample's position.
-    min: [i64; 3],
     /// The lowest node, in nodes.
     first: [i64; 3],
     /// Nodes per axis.
     size: [usize; 3],
+    /// For each sample along each axis, the node below it, and how much of the way to the next it lies behind it.
+    places: [Vec<(usize, f32)>; 3],
     /// Coordinates of nodes along x. Units: world.
     xs: Vec<f64>,
-    spacing: f64,
+    /// World units between nodes.
+    step: f64,
     /// For both noises, along x for each y and z, y first.
     rows: [Vec<Option<NoiseRow>>; 2],
     /// Noise at the nodes of the line that is being interpolated.
-    nodes: Vec<[f64; 4]>,
+    nodes: Vec<[f32; 4]>,
 }
 
 impl Lattice {
     fn new(every: u32, region: &SourceRegion) -> Self {
         let every = i64::from(every);
-        let min = region.min.map(i64::from);
-        let first = min.map(|min| min.div_euclid(every));
-        let size = [0, 1, 2].map(|axis| {
-            let last = (min[axis] + i64::from(region.size[axis]) - 1).div_euclid(every) + 1;
-            (last - first[axis] + 1) as usize
+        let first = region.min.map(|min| i64::from(min).div_euclid(every));
+        let places = [0, 1, 2].map(|axis| {
+            let positions = (0..region.size[axis]).map(|index| i64::from(region.min[axis]) + i64::from(index));
+            let place = |position: i64| {
+                let node = position.div_euclid(every) - first[axis];
+                (node as usize, position.rem_euclid(every) as f32 / every as f32)
+            };
+            positions.map(place).collect::<Vec<_>>()
         });
-        let xs = (0..size[0] as i64).map(|node| ((first[0] + node) * every) as f64 * region.spacing).collect();
+        let size = [0, 1, 2].map(|axis| places[axis].last().map_or(0, |(node, _)| node + 2));
+        let step = every as f64 * region.spacing;
+        let xs = (0..size[0] as i64).map(|node| (first[0] + node) as f64 * step).collect();
         let rows = [(); 2].map(|()| vec![None; size[1] * size[2]]);
-        Self { every, min, first, size, xs, spacing: region.spacing, rows, nodes: Vec::new() }
+        Self { first, size, places, xs, step, rows, nodes: Vec::new() }
     }
 
-    /// Interpolates a row. A value depends on nothing but its position, whatever the region.
-    fn row(
-        &mut self,
-        which: usize,
-        octaves: &Octaves,
-        line: &Line,
-        range: Range<usize>,
-        row: &mut NoiseRow,
-        calls: &mut u64,
-    ) {
-        let node = |axis: usize, index: usize| {
-            let position = self.min[axis] + index as i64;
-            let node = position.div_euclid(self.every);
-            ((node - self.first[axis]) as usize, (position - node * self.every) as f64 / self.every as f64)
-        };
-        let [(y, share_y), (z, share_z)] = [node(1, line.index[0] as usize), node(2, line.index[1] as usize)];
-        let (low, high) = (node(0, range.start).0, node(0, range.end - 1).0 + 1);
-        let places: Vec<(usize, f64)> = range.map(|index| node(0, index)).collect();
+    /// Interpolates a row of local y and z, and returns how often it evaluated noise. A value depends on nothing but its
+    /// position, whatever the region.
+    fn row(&mut self, which: usize, octaves: &Octaves, line: [u32; 2], range: Range<usize>, row: &mut NoiseRow) -> u64 {
+        let mut calls = 0;
+        let [(y, share_y), (z, share_z)] = [self.places[1][line[0] as usize], self.places[2][line[1] as usize]];
+        let places = &self.places[0][range];
+        let (Some((low, _)), Some((last, _))) = (places.first(), places.last()) else { return 0 };
         self.nodes.clear();
-        self.nodes.resize(high - low + 1, [0.0; 4]);
+        self.nodes.resize(last - low + 2, [0.0; 4]);
         for (step_z, share_z) in [(0, 1.0 - share_z), (1, share_z)] {
             for (step_y, share_y) in [(0, 1.0 - share_y), (1, share_y)] {
                 let share = share_y * share_z;
@@ -283,29 +301,27 @@ impl Lattice {
                 }
                 let index = y + step_y + self.size[1] * (z + step_z);
                 let nodes = self.rows[which][index].get_or_insert_with(|| {
-                    let at = |axis: usize, node: usize| {
-                        ((self.first[axis] + node as i64) * self.every) as f64 * self.spacing
-                    };
+                    let at = |axis: usize, node: usize| (self.first[axis] + node as i64) as f64 * self.step;
                     let mut nodes = NoiseRow::default();
-                    *calls += octaves.row_3d(&self.xs, at(1, y + step_y), at(2, z + step_z), &mut nodes);
+                    calls += octaves.row_3d(&self.xs, at(1, y + step_y), at(2, z + step_z), &mut nodes);
                     nodes
                 });
-                for (sum, node) in self.nodes.iter_mut().zip(low..) {
-                    let [x, y, z] = &nodes.gradient;
-                    for (sum, value) in sum.iter_mut().zip([nodes.value[node], x[node], y[node], z[node]]) {
+                let NoiseRow { value, gradient: [by_x, by_y, by_z], .. } = nodes;
+                for (sum, node) in self.nodes.iter_mut().zip(*low..) {
+                    for (sum, value) in sum.iter_mut().zip([value[node], by_x[node], by_y[node], by_z[node]]) {
                         *sum += share * value;
                     }
                 }
             }
         }
         row.reset(places.len());
-        for (index, (node, share)) in places.into_iter().enumerate() {
+        let NoiseRow { value, gradient: [by_x, by_y, by_z], .. } = row;
+        let out = value.iter_mut().zip(by_x).zip(by_y).zip(by_z);
+        for ((((value, by_x), by_y), by_z), (node, share)) in out.zip(places) {
             let [a, b] = [self.nodes[node - low], self.nodes[node - low + 1]];
-            let [value, x, y, z] = core::array::from_fn(|which| a[which] + share * (b[which] - a[which]));
-            row.value[index] = value;
-            for (gradient, value) in row.gradient.iter_mut().zip([x, y, z]) {
-                gradient[index] = value;
-            }
+            let at: [f32; 4] = core::array::from_fn(|which| a[which] + share * (b[which] - a[which]));
+            [*value, *by_x, *by_y, *by_z] = at;
         }
+        calls
     }
 }
