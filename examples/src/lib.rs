@@ -6,11 +6,13 @@ pub mod files;
 pub mod glb;
 pub mod graphics;
 pub mod ground;
+mod indexed;
 pub mod look;
 pub mod picture;
 pub mod sky;
 pub mod small;
 pub mod solid;
+pub mod stage;
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -15,6 +15,7 @@ use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 
 use crate::files::{check_file, write_atomically};
+use crate::indexed;
 
 /// `DefaultPlugins` for a window of that title.
 pub fn window_plugins(title: &str) -> PluginGroupBuilder {
@@ -47,6 +48,10 @@ pub struct PicturePlugin {
 /// Set this to true when the scene is complete.
 #[derive(Resource, Default)]
 pub struct PictureReady(pub bool);
+
+/// While this is there, the picture's file is small: it has at most 256 colours.
+#[derive(Resource)]
+pub struct FewColors;
 
 #[derive(Resource)]
 struct Picture {
@@ -84,8 +89,13 @@ fn take_picture(mut commands: Commands, mut picture: ResMut<Picture>, mut camera
     picture.frames += 1;
 }
 
-fn save_and_exit(captured: On<ScreenshotCaptured>, picture: Res<Picture>, mut exit: MessageWriter<AppExit>) {
-    exit.write(match save(&captured.image, &picture.path) {
+fn save_and_exit(
+    captured: On<ScreenshotCaptured>,
+    picture: Res<Picture>,
+    few_colors: Option<Res<FewColors>>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    exit.write(match save(&captured.image, &picture.path, few_colors.is_some()) {
         Ok(()) => {
             println!("Wrote {}.", picture.path.display());
             AppExit::Success
@@ -129,12 +139,18 @@ pub fn picture_size(text: &str) -> Result<UVec2, String> {
     size.filter(valid).ok_or("it must be two whole numbers from 16 to 8192, with a comma between them".to_owned())
 }
 
-fn save(image: &Image, path: &Path) -> Result<(), Box<dyn Error>> {
-    let format = ImageFormat::Png.as_image_crate_format().ok_or("PNG is not supported")?;
+fn save(image: &Image, path: &Path, few_colors: bool) -> Result<(), Box<dyn Error>> {
     // Without the alpha channel, which means nothing here.
     let image = image.clone().try_into_dynamic()?.to_rgb8();
-    let mut file = Cursor::new(Vec::new());
-    image.write_to(&mut file, format)?;
-    write_atomically(path, |out| out.write_all(file.get_ref()))?;
+    let file = if few_colors {
+        let pixels: Vec<[u8; 3]> = image.pixels().map(|pixel| pixel.0).collect();
+        indexed::encode(image.width(), image.height(), &pixels)?
+    } else {
+        let format = ImageFormat::Png.as_image_crate_format().ok_or("PNG is not supported")?;
+        let mut file = Cursor::new(Vec::new());
+        image.write_to(&mut file, format)?;
+        file.into_inner()
+    };
+    write_atomically(path, |out| out.write_all(&file))?;
     Ok(())
 }

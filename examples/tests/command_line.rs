@@ -1,6 +1,7 @@
 //! What `sculpt`, `ambiguous_cells`, `cellular_caves`, `falling_pieces` and `flyover` say and return: bad input gets one
 //! clear sentence and code 2, the headless runs make meshes without defects, `ambiguous_cells` prints its figures, what
-//! `falling_pieces` cuts loose comes to rest, and `flyover` counts what it loads.
+//! `falling_pieces` cuts loose comes to rest, and `flyover` counts what it loads. And the pictures of the pages of
+//! documentation are of the programs on them.
 
 mod common;
 
@@ -228,18 +229,37 @@ fn caves_may_be_all_or_nothing() {
     assert_eq!(air(&["--fill", "1", "--survival", "0"]), "air: 0.00 %, of which 0.00 % are the largest cave");
 }
 
-/// What stands before `fn main` in the page's programs, but for `use`, stands in the same words in `bits_pictures`.
 #[test]
 fn the_pictures_of_bits_are_of_the_page_s_functions() {
+    assert_drawn("../crates/marchless/docs/bits.md", "examples/bits_pictures/snippets.rs", 5);
+}
+
+#[test]
+fn the_pictures_of_sources_are_of_the_page_s_functions() {
+    assert_drawn("../crates/bevy_marchless/docs/sources.md", "examples/source_pictures/snippets.rs", 9);
+}
+
+/// What stands before `fn main` in the page's programs, but for `use`, stands in the same words in what is drawn.
+#[track_caller]
+fn assert_drawn(page: &str, snippets: &str, programs: usize) {
     let read = |path: &str| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("it is there");
-    let page = read("../crates/marchless/docs/bits.md");
-    let drawn = read("examples/bits_pictures/snippets.rs").replace("pub(crate) fn ", "fn ");
-    let programs: Vec<&str> = page.split("```rust\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
-    assert_eq!(programs.len(), 5);
-    for program in programs {
+    let page = read(page);
+    let drawn = read(snippets).replace("pub(crate) fn ", "fn ");
+    let found: Vec<&str> = page.split("```rust\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert_eq!(found.len(), programs);
+    for program in found {
         let (functions, _) = program.split_once("fn main()").expect("a program");
         let (_, functions) = functions.split_once("\n\n").expect("`use` lines come first");
-        assert!(drawn.contains(functions.trim_end()), "these are not in snippets.rs:\n{functions}");
+        assert!(drawn.contains(functions.trim_end()), "these are not in {snippets}:\n{functions}");
+    }
+}
+
+#[test]
+fn pictures_of_the_pages_refuse_what_they_do_not_know() {
+    for name in ["bits_pictures", "source_pictures"] {
+        assert_refused_by(name, &["rubbish", "a.png"], "possible values");
+        assert_refused_by(name, &["caves", "a.jpg"], ".png");
+        assert_refused_by(name, &["caves", "missing_folder/a.png"], "no folder missing_folder");
     }
 }
 

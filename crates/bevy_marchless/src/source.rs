@@ -1,5 +1,15 @@
 //! Sources: what a terrain is made of before anybody digs.
 //!
+//! [noise]: ../../../../crates/bevy_marchless/docs/pictures/noise.png
+//! [ridges]: ../../../../crates/bevy_marchless/docs/pictures/ridges.png
+//! [terraces]: ../../../../crates/bevy_marchless/docs/pictures/terraces.png
+//! [warp]: ../../../../crates/bevy_marchless/docs/pictures/warp.png
+//! [product]: ../../../../crates/bevy_marchless/docs/pictures/product.png
+//! [caves]: ../../../../crates/bevy_marchless/docs/pictures/caves.png
+//! [tunnels]: ../../../../crates/bevy_marchless/docs/pictures/tunnels.png
+//! [shapes]: ../../../../crates/bevy_marchless/docs/pictures/shapes.png
+//! [materials]: ../../../../crates/bevy_marchless/docs/pictures/materials.png
+//!
 //! # Choosing one
 //!
 //! | you have | take | chunks skipped without sampling | time to fill |
@@ -53,6 +63,8 @@
 //!
 //! Sources are floating point: they promise the same samples on the same machine and build, and nothing across
 //! machines.
+//!
+#![cfg_attr(feature = "noise", doc = include_str!("../docs/sources.md"))]
 
 #[cfg(feature = "noise")]
 mod fractal;

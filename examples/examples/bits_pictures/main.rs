@@ -10,19 +10,15 @@
 
 mod snippets;
 
-use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use bevy::core_pipeline::tonemapping::Tonemapping;
-use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
 use clap::{Parser, ValueEnum};
 use marchless::bits::BitGrid;
 use marchless::{Region, Shape};
-use marchless_examples::graphics;
-use marchless_examples::picture::{PicturePlugin, PictureReady, check_picture, picture_plugins};
 use marchless_examples::solid::Solid;
+use marchless_examples::stage::{self, Failure, Prop, Stage};
 
 /// Renders a picture of the page on grids of bits.
 #[derive(Parser)]
@@ -41,10 +37,6 @@ enum Scene {
     Floating,
 }
 
-/// What a person gave is of no use.
-const BAD_INPUT: u8 = 2;
-/// There is no graphics adapter.
-const NO_GRAPHICS: u8 = 3;
 /// [Units: pixels]
 const SIZE: UVec2 = UVec2::new(480, 300);
 
@@ -53,42 +45,11 @@ const WATER: [f32; 3] = [0.16, 0.46, 0.80];
 const MOSS: [f32; 3] = [0.42, 0.50, 0.27];
 const PIECES: [[f32; 3]; 3] = [[0.86, 0.36, 0.20], [0.91, 0.68, 0.22], [0.30, 0.52, 0.72]];
 
+const SUN: Vec3 = Vec3::new(-0.6, -1.0, -0.55);
+
 fn main() -> ExitCode {
     let Args { scene, picture } = Args::parse();
-    let stage = check_picture(&picture).map_err(Into::into).and_then(|()| scene.stage());
-    let stage = match stage {
-        Ok(stage) => stage,
-        Err(error) => {
-            eprintln!("bits_pictures: {error}");
-            return ExitCode::from(BAD_INPUT);
-        }
-    };
-    let picture = PicturePlugin { path: picture, size: SIZE };
-    match graphics::build(|app| _ = app.add_plugins((picture_plugins(), picture))) {
-        Err(reason) => {
-            eprintln!("bits_pictures: no picture can be rendered, since {reason}");
-            ExitCode::from(NO_GRAPHICS)
-        }
-        Ok(mut app) => {
-            app.insert_resource(ClearColor(Color::srgb(0.93, 0.94, 0.96)))
-                .insert_resource(GlobalAmbientLight { brightness: 900.0, ..default() })
-                .insert_resource(stage)
-                .add_systems(Startup, set_up)
-                .add_systems(Update, be_ready)
-                .run();
-            ExitCode::SUCCESS
-        }
-    }
-}
-
-/// What is drawn, and from where.
-#[derive(Resource)]
-struct Stage {
-    bodies: Vec<Body>,
-    /// The middle of what is looked at. [Units: points]
-    target: Vec3,
-    /// From there to the camera. [Units: points]
-    eye: Vec3,
+    stage::render("bits_pictures", picture, SIZE, || scene.stage())
 }
 
 /// A grid in its place, in one colour.
@@ -102,9 +63,17 @@ impl Body {
     fn new(bits: BitGrid, color: [f32; 3]) -> Self {
         Self { bits, place: [0; 3], color }
     }
+
+    fn prop(&self) -> Result<Prop> {
+        let mut solid = Solid::new(&self.bits)?;
+        // The grid's outer faces, and that of a cut, stay flat.
+        let ends = self.bits.shape().size().map(|size| size as f32 - 0.5);
+        solid.smooth(3, |position| core::array::from_fn(|axis| position[axis] == -0.5 || position[axis] == ends[axis]));
+        Ok(Prop { mesh: solid.to_asset(|_, _, _| self.color), place: IVec3::from(self.place).as_vec3() })
+    }
 }
 
-type Result<T> = core::result::Result<T, Box<dyn Error + Send + Sync>>;
+type Result<T> = core::result::Result<T, Failure>;
 
 impl Scene {
     fn stage(self) -> Result<Stage> {
@@ -120,11 +89,7 @@ impl Scene {
 
 fn caves() -> Result<Stage> {
     let caves = snippets::caves(Shape::cube(64)?, 1)?;
-    Ok(Stage {
-        bodies: vec![Body::new(caves, PIECES[1])],
-        target: Vec3::splat(31.5),
-        eye: 140.0 * Vec3::new(0.62, 0.55, 0.9),
-    })
+    stage(&[Body::new(caves, PIECES[1])], Vec3::splat(31.5), 140.0 * Vec3::new(0.62, 0.55, 0.9))
 }
 
 fn water() -> Result<Stage> {
@@ -137,22 +102,18 @@ fn water() -> Result<Stage> {
     for bits in [&mut rock, &mut water] {
         bits.fill(Region::new([0, 0, 32], [64; 3]), false);
     }
-    Ok(Stage {
-        bodies: vec![Body::new(rock, ROCK), Body::new(water, WATER)],
-        target: Vec3::new(31.5, 30.0, 24.0),
-        eye: 135.0 * Vec3::new(0.35, 0.38, 0.95),
-    })
+    stage(
+        &[Body::new(rock, ROCK), Body::new(water, WATER)],
+        Vec3::new(31.5, 30.0, 24.0),
+        135.0 * Vec3::new(0.35, 0.38, 0.95),
+    )
 }
 
 fn erosion() -> Result<Stage> {
     let rock = BitGrid::from_fn(Shape::new([100, 40, 21])?, snippets::columns)?;
     let left = snippets::weathered(&rock, 4)?;
     let before = Body { bits: rock, place: [0, 0, -30], color: PIECES[1] };
-    Ok(Stage {
-        bodies: vec![before, Body::new(left, ROCK)],
-        target: Vec3::new(49.5, 14.0, -5.0),
-        eye: 135.0 * Vec3::new(0.32, 0.5, 0.85),
-    })
+    stage(&[before, Body::new(left, ROCK)], Vec3::new(49.5, 14.0, -5.0), 135.0 * Vec3::new(0.32, 0.5, 0.85))
 }
 
 fn collision() -> Result<Stage> {
@@ -163,7 +124,7 @@ fn collision() -> Result<Stage> {
         .map(|(start, &color)| Body { bits: ball.clone(), place: snippets::rolled(&ground, &ball, start), color })
         .collect();
     bodies.push(Body::new(ground, MOSS));
-    Ok(Stage { bodies, target: Vec3::new(47.5, 12.0, 47.5), eye: 180.0 * Vec3::new(0.45, 0.62, 0.75) })
+    stage(&bodies, Vec3::new(47.5, 12.0, 47.5), 180.0 * Vec3::new(0.45, 0.62, 0.75))
 }
 
 fn floating() -> Result<Stage> {
@@ -178,43 +139,10 @@ fn floating() -> Result<Stage> {
         rock.subtract(&body.bits)?;
     }
     bodies.push(Body::new(rock, ROCK));
-    Ok(Stage { bodies, target: Vec3::new(39.5, 16.0, 19.5), eye: 120.0 * Vec3::new(0.3, 0.42, 0.9) })
+    stage(&bodies, Vec3::new(39.5, 16.0, 19.5), 120.0 * Vec3::new(0.3, 0.42, 0.9))
 }
 
-fn set_up(
-    stage: Res<Stage>,
-    mut meshes: ResMut<Assets<Mesh>>,
-    mut materials: ResMut<Assets<StandardMaterial>>,
-    mut commands: Commands,
-) -> bevy::ecs::error::Result {
-    let material = materials.add(StandardMaterial { perceptual_roughness: 0.9, reflectance: 0.2, ..default() });
-    for Body { bits, place, color } in &stage.bodies {
-        let mut solid = Solid::new(bits)?;
-        // The grid's outer faces, and that of a cut, stay flat.
-        let ends = bits.shape().size().map(|size| size as f32 - 0.5);
-        solid.smooth(3, |position| core::array::from_fn(|axis| position[axis] == -0.5 || position[axis] == ends[axis]));
-        commands.spawn((
-            Mesh3d(meshes.add(solid.to_asset(|_, _, _| *color))),
-            MeshMaterial3d(material.clone()),
-            Transform::from_translation(IVec3::from(*place).as_vec3()),
-        ));
-    }
-    commands.spawn((
-        Camera3d::default(),
-        Projection::from(PerspectiveProjection { fov: 0.6, ..default() }),
-        Transform::from_translation(stage.target + stage.eye).looking_at(stage.target, Vec3::Y),
-        Tonemapping::AcesFitted,
-    ));
-    commands.spawn((
-        DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: true, ..default() },
-        CascadeShadowConfigBuilder { num_cascades: 2, maximum_distance: 400.0, ..default() }.build(),
-        Transform::default().looking_to(Vec3::new(-0.6, -1.0, -0.55), Vec3::Y),
-    ));
-    Ok(())
-}
-
-/// Meshes and materials arrive with the first updates.
-fn be_ready(mut updates: Local<u32>, mut ready: ResMut<PictureReady>) {
-    *updates += 1;
-    ready.0 = *updates > 3;
+/// `eye`: from `target` to the camera. [Units: points]
+fn stage(bodies: &[Body], target: Vec3, eye: Vec3) -> Result<Stage> {
+    Ok(Stage { props: bodies.iter().map(Body::prop).collect::<Result<_>>()?, target, eye, sun: SUN })
 }
