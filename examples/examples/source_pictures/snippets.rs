@@ -9,7 +9,7 @@ pub(crate) fn hills() -> Layer {
 
 /// Mountains with sharp ridges.
 pub(crate) fn ridges() -> Layer {
-    36.0 + Layer::ridges(Fractal { seed: 2, zoom: 170.0, ..Fractal::default() }, 54.0)
+    40.0 + Layer::ridges(Fractal { seed: 8, zoom: 120.0, persistence: 0.35, ..Fractal::default() }, 46.0)
 }
 
 /// Hills in steps of 9.
@@ -35,9 +35,9 @@ pub(crate) fn plains_and_mountains() -> Layer {
 /// Hills with caves in them, but neither near the surface nor in the lowest ten units.
 pub(crate) fn caves() -> Solid {
     let hills = 78.0 + Layer::noise(Fractal { seed: 1, zoom: 120.0, ..Fractal::default() }, 60.0);
-    let noise = Fractal { seed: 6, octaves: 3, zoom: 46.0, ..Fractal::default() };
+    let noise = Fractal { seed: 14, octaves: 3, zoom: 46.0, ..Fractal::default() };
     let caves = Solid::from(Caves { noise, threshold: 0.1, lattice: 1 })
-        .intersection(hills.clone() + -6.0)
+        .intersection(hills.clone() + -9.0)
         .intersection(Sdf::half_space([0.0, 10.0, 0.0], [0.0, -1.0, 0.0]));
     Solid::from(hills).subtraction(caves)
 }
