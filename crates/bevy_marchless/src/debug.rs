@@ -5,6 +5,7 @@ mod gizmos;
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic as _};
+use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 #[cfg(feature = "gizmos")]
 pub use gizmos::{ChunkBoundsGizmos, ShowChunkBounds};
@@ -38,7 +39,8 @@ impl DebugPlugin {
     pub const WAITING_CHUNKS: DiagnosticPath = DiagnosticPath::const_new("marchless/waiting_chunks");
     /// How long the plugin's systems took in an update, in milliseconds.
     pub const MAIN_THREAD: DiagnosticPath = DiagnosticPath::const_new("marchless/main_thread");
-    /// How much memory samples and geometry take, in bytes; measured every 64 updates.
+    /// How much memory samples and geometry take, in bytes. Samples are gone through a part at a time, so that it lags an
+    /// update behind for every 128 chunks that have some.
     pub const RESIDENT_BYTES: DiagnosticPath = DiagnosticPath::const_new("marchless/resident_bytes");
     /// The same, divided by how many chunks have something to draw.
     pub const BYTES_PER_SURFACE_CHUNK: DiagnosticPath = DiagnosticPath::const_new("marchless/bytes_per_surface_chunk");
@@ -61,6 +63,7 @@ impl Plugin for DebugPlugin {
         ] {
             app.register_diagnostic(Diagnostic::new(path).with_suffix(suffix));
         }
+        app.init_resource::<Drawn>().add_observer(add_geometry).add_observer(take_away_geometry);
         app.add_systems(PostUpdate, measure.in_set(MarchlessSystems::Report));
         #[cfg(feature = "gizmos")]
         gizmos::build(app);
@@ -72,32 +75,89 @@ impl Plugin for DebugPlugin {
     }
 }
 
-fn measure(
+/// What is drawn, in all.
+#[derive(Resource, Default)]
+struct Drawn {
+    chunks: u32,
+    triangles: usize,
+    bytes: usize,
+}
+
+fn add_geometry(insert: On<Insert, ChunkGeometry>, geometries: Query<&ChunkGeometry>, mut drawn: ResMut<Drawn>) {
+    if let Ok(ChunkGeometry { mesh }) = geometries.get(insert.entity)
+        && !mesh.is_empty()
+    {
+        drawn.chunks += 1;
+        drawn.triangles += mesh.triangle_count();
+        drawn.bytes += geometry_bytes(mesh);
+    }
+}
+
+fn take_away_geometry(
+    discard: On<Discard, ChunkGeometry>,
     geometries: Query<&ChunkGeometry>,
-    volumes: Query<&TerrainVolume>,
+    mut drawn: ResMut<Drawn>,
+) {
+    if let Ok(ChunkGeometry { mesh }) = geometries.get(discard.entity)
+        && !mesh.is_empty()
+    {
+        drawn.chunks -= 1;
+        drawn.triangles -= mesh.triangle_count();
+        drawn.bytes -= geometry_bytes(mesh);
+    }
+}
+
+/// Going through a volume's samples, a part in each update.
+#[derive(Default)]
+struct Sweep {
+    next: Option<[i32; 3]>,
+    so_far: usize,
+    /// What the last one that is complete found. Unit: bytes.
+    found: Option<usize>,
+}
+
+/// So many chunks of a volume are looked at per update.
+const SWEPT: usize = 128;
+
+impl Sweep {
+    fn go_on(&mut self, volume: &TerrainVolume) {
+        let (bytes, next) = volume.sample_bytes_from(self.next.unwrap_or([i32::MIN; 3]), SWEPT);
+        (self.so_far, self.next) = (self.so_far + bytes, next);
+        if next.is_none() {
+            self.found = Some(core::mem::take(&mut self.so_far));
+        }
+    }
+}
+
+fn measure(
+    volumes: Query<(Entity, &TerrainVolume)>,
+    drawn: Res<Drawn>,
+    mut sweeps: Local<EntityHashMap<Sweep>>,
     mut stats: ResMut<Stats>,
     main_thread: Res<MainThread>,
     mut diagnostics: Diagnostics,
 ) {
-    let (mut drawn, mut triangles, mut bytes) = (0u32, 0, 0);
-    for mesh in geometries.iter().map(|geometry| &geometry.mesh).filter(|mesh| !mesh.is_empty()) {
-        (drawn, triangles, bytes) = (drawn + 1, triangles + mesh.triangle_count(), bytes + geometry_bytes(mesh));
-    }
-    diagnostics.add_measurement(&DebugPlugin::CHUNKS, || f64::from(drawn));
-    diagnostics.add_measurement(&DebugPlugin::TRIANGLES, || triangles as f64);
-    let unfilled = || volumes.iter().map(|volume| volume.unfilled).sum::<usize>();
-    diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || unfilled() as f64);
-    let unmeshed = || volumes.iter().map(TerrainVolume::waiting_for_meshes).sum::<usize>();
-    diagnostics.add_measurement(&DebugPlugin::MESH_QUEUE, || unmeshed() as f64);
-    let waiting = || volumes.iter().map(TerrainVolume::waiting).sum::<usize>();
-    diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || waiting() as f64);
+    let chunks = f64::from(drawn.chunks);
+    diagnostics.add_measurement(&DebugPlugin::CHUNKS, || chunks);
+    diagnostics.add_measurement(&DebugPlugin::TRIANGLES, || drawn.triangles as f64);
+    let all = |of: fn(&TerrainVolume) -> usize| volumes.iter().map(|(_, volume)| of(volume)).sum::<usize>() as f64;
+    diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || all(|volume| volume.unfilled));
+    diagnostics.add_measurement(&DebugPlugin::MESH_QUEUE, || all(TerrainVolume::waiting_for_meshes));
+    diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || all(TerrainVolume::waiting));
     let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
     diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(main_thread.so_far()));
-    if stats.update % 64 == 1 {
-        bytes += volumes.iter().map(TerrainVolume::sample_bytes).sum::<usize>();
-        diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes as f64);
-        if drawn > 0 {
-            diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes as f64 / f64::from(drawn));
+    sweeps.retain(|terrain, _| volumes.contains(*terrain));
+    let mut samples = Some(0);
+    for (terrain, volume) in &volumes {
+        let sweep = sweeps.entry(terrain).or_default();
+        sweep.go_on(volume);
+        samples = samples.zip(sweep.found).map(|(samples, found)| samples + found + volume.notes_bytes());
+    }
+    if let Some(samples) = samples {
+        let bytes = (samples + drawn.bytes) as f64;
+        diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes);
+        if drawn.chunks > 0 {
+            diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes / chunks);
         }
     }
     let meshed = core::mem::take(&mut stats.meshed);

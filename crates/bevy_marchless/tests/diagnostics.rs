@@ -7,6 +7,7 @@ use bevy_diagnostic::{DiagnosticPath, DiagnosticsStore};
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use common::*;
+use marchless::MeshBuffer;
 
 fn latest(app: &App, path: &DiagnosticPath) -> Option<f64> {
     app.world().resource::<DiagnosticsStore>().get(path).expect("registered").value()
@@ -38,4 +39,21 @@ fn diagnostics_follow_the_work() {
     app.update();
     assert_eq!(latest(&app, &DebugPlugin::EDIT_UPDATES), Some(0.0), "shown in the update that read it");
     assert!(latest(&app, &DebugPlugin::EDIT_TIME).unwrap() > 0.0);
+
+    let drawn = geometry(&mut app, terrain);
+    let triangles: usize = drawn.iter().map(|(_, mesh)| mesh.triangle_count()).sum();
+    assert_eq!(latest(&app, &DebugPlugin::CHUNKS), Some(drawn.len() as f64));
+    assert_eq!(latest(&app, &DebugPlugin::TRIANGLES), Some(triangles as f64), "of the changed chunks too");
+    app.update();
+    let samples = app.world().get::<TerrainVolume>(terrain).unwrap().sample_bytes();
+    let of_mesh = |mesh: &MeshBuffer| 24 * mesh.positions.len() + mesh.materials.len() + 4 * mesh.indices.len();
+    let bytes = (samples + drawn.iter().map(|(_, mesh)| of_mesh(mesh)).sum::<usize>()) as f64;
+    assert_eq!(latest(&app, &DebugPlugin::RESIDENT_BYTES), Some(bytes));
+    assert_eq!(latest(&app, &DebugPlugin::BYTES_PER_SURFACE_CHUNK), Some(bytes / drawn.len() as f64));
+
+    app.world_mut().despawn(terrain);
+    app.update();
+    for path in [DebugPlugin::CHUNKS, DebugPlugin::TRIANGLES, DebugPlugin::RESIDENT_BYTES] {
+        assert_eq!(latest(&app, &path), Some(0.0), "{path}");
+    }
 }

@@ -197,6 +197,11 @@ impl<W: Weight> Grid<W> {
         self.chunks.iter().map(|(position, chunk)| (*position, chunk))
     }
 
+    /// The chunks from `position` on, in the order of [`chunks`](Self::chunks): for going through them a part at a time.
+    pub fn chunks_from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+        self.chunks.range(position..).map(|(position, chunk)| (*position, chunk))
+    }
+
     /// Takes the chunk at `position` out, so that it reads as air, and marks it and its neighbours dirty.
     pub fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
         let chunk = self.chunks.remove(&position)?;

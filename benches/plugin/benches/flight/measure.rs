@@ -93,8 +93,8 @@ impl Flight {
         let stats = since(app.world().resource::<StreamStats>(), &before);
         let (time, main_thread) = (start.elapsed(), times.iter().sum());
         times.sort();
-        // Memory is measured now and then.
-        for _ in 0..64 {
+        // Memory is measured bit by bit.
+        for _ in 0..200 {
             app.update();
         }
         let diagnostic = |path: &DiagnosticPath| {

@@ -230,20 +230,40 @@ impl TerrainVolume {
 
     /// How much memory the samples take, in bytes: what is drawn, what is newest, and the plugin's notes about each chunk.
     pub fn sample_bytes(&self) -> usize {
-        let samples = |chunk: &Chunk<i16>| match chunk {
-            Chunk::Uniform(_) => 0,
-            Chunk::Samples(samples) => 2 * samples.weights.capacity() + samples.materials.capacity(),
-        };
-        let newest: usize = self.grid.chunks().map(|(_, chunk)| samples(chunk)).sum();
-        let older = self
-            .shown
-            .chunks()
-            .filter(|(position, shown)| !self.grid.chunk(*position).is_some_and(|newest| same_samples(newest, shown)));
-        let entries = self.grid.chunks().count() + self.shown.chunks().count();
-        newest
-            + older.map(|(_, chunk)| samples(chunk)).sum::<usize>()
-            + entries * size_of::<([i32; 3], Chunk<i16>)>()
-            + self.chunks.len() * size_of::<(ChunkKey, ChunkState)>()
+        self.sample_bytes_from([i32::MIN; 3], usize::MAX).0 + self.notes_bytes()
+    }
+
+    /// How much memory the plugin's notes about chunks take, in bytes.
+    pub(crate) fn notes_bytes(&self) -> usize {
+        self.chunks.len() * size_of::<(ChunkKey, ChunkState)>()
+    }
+
+    /// How much memory the samples of at most so many chunks take, in bytes, from a position on; and the position where to
+    /// go on, if any are left.
+    pub(crate) fn sample_bytes_from(&self, from: [i32; 3], most: usize) -> (usize, Option<[i32; 3]>) {
+        let mut newest = self.grid.chunks_from(from).peekable();
+        let mut shown = self.shown.chunks_from(from).peekable();
+        let mut bytes = 0;
+        for done in 0.. {
+            let Some(next) = newest.peek().into_iter().chain(shown.peek()).map(|(position, _)| *position).min() else {
+                break;
+            };
+            if done == most {
+                return (bytes, Some(next));
+            }
+            let [newest, shown] =
+                [&mut newest, &mut shown].map(|chunks| chunks.next_if(|(position, _)| *position == next));
+            let entries = [newest, shown].into_iter().flatten();
+            bytes += entries.map(|_| size_of::<([i32; 3], Chunk<i16>)>()).sum::<usize>();
+            bytes += match (newest, shown) {
+                (Some((_, newest)), Some((_, shown))) if !same_samples(newest, shown) => {
+                    bytes_of(newest) + bytes_of(shown)
+                }
+                (Some((_, chunk)), _) | (None, Some((_, chunk))) => bytes_of(chunk),
+                (None, None) => 0,
+            };
+        }
+        (bytes, None)
     }
 
     /// How many chunks in range, or beside it, wait for their samples or their mesh.
@@ -396,6 +416,14 @@ impl ChunkState {
             (true, true) => LeafState::Empty,
             (true, false) => LeafState::Drawn,
         }
+    }
+}
+
+/// How much memory a chunk's samples take, in bytes.
+fn bytes_of(chunk: &Chunk<i16>) -> usize {
+    match chunk {
+        Chunk::Uniform(_) => 0,
+        Chunk::Samples(samples) => 2 * samples.weights.capacity() + samples.materials.capacity(),
     }
 }
 
