@@ -10,7 +10,6 @@
 mod handmade;
 mod job;
 
-use core::cmp::Reverse;
 use core::time::Duration;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -134,9 +133,10 @@ fn mesh_terrains(
         }
     }
     for (terrain, mut volume) in &mut volumes {
-        if !volume.ready.is_empty() || !volume.pending.is_empty() {
+        if !volume.ready.is_empty() || !volume.to_mesh.is_empty() || !volume.pending.is_empty() {
             let mut start = Start { terrain, queue: &queue, results: &results, screen: &mut screen, inline: 0 };
-            start.ready_chunks(&mut volume, &settings, until);
+            start.ready_chunks(&mut volume, until);
+            start.first_meshes(&mut volume, &settings, until);
             start.inline = settings.inline_chunks;
             start.pending_chunks(&mut volume);
         }
@@ -163,20 +163,11 @@ struct Start<'a, 'w, 's> {
 }
 
 impl Start<'_, '_, '_> {
-    /// Starts the chunks that can be meshed for the first time, one by one; those without a surface need no job.
-    fn ready_chunks(&mut self, volume: &mut TerrainVolume, settings: &MarchlessSettings, until: Instant) {
-        let limit = in_flight(settings);
-        let mut ready = core::mem::take(&mut volume.ready);
-        if volume.first_meshes + ready.len() > limit {
-            let (ranges, chunks) = (volume.streaming.ranges(), &volume.chunks);
-            ready.retain(|key| chunks.get(key).is_some_and(ChunkState::is_ready));
-            // Those that come first are at the end.
-            ready.sort_by_cached_key(|key| Reverse((ranges.urgency(key.position), *key)));
-            ready.dedup();
-        }
+    /// Goes through the chunks that can be meshed for the first time; those without a surface need no job.
+    fn ready_chunks(&mut self, volume: &mut TerrainVolume, until: Instant) {
         let mut no_longer_drawn = BTreeSet::new();
         let (mut done, mut later) = (0, Vec::new());
-        while let Some(key) = ready.pop() {
+        while let Some(key) = volume.ready.pop() {
             let is_ready = volume.chunks.get(&key).is_some_and(ChunkState::is_ready);
             if !is_ready || volume.pending.iter().any(|pending| pending.chunks.contains(&key)) {
                 // Gone, or meshed already; or it will be, with the changed ones.
@@ -194,21 +185,40 @@ impl Start<'_, '_, '_> {
                 } else {
                     no_longer_drawn.insert(key);
                 }
-            } else if volume.first_meshes < limit {
-                let urgency = volume.streaming.ranges().urgency(key.position);
-                let pending = Pending { chunks: BTreeSet::from([key]), since: None };
-                self.group(volume, pending, Priority::FirstMesh(urgency));
             } else {
-                later.push(key);
+                volume.to_mesh.add(key);
             }
             done += 1;
             if done % 16 == 0 && Instant::now() >= until {
                 break;
             }
         }
-        volume.ready.append(&mut ready);
         volume.ready.append(&mut later);
         self.group(volume, Pending { chunks: no_longer_drawn, since: None }, Priority::Edit);
+    }
+
+    /// Starts the most urgent chunks that are to be meshed for the first time, one by one, as many as may be in flight.
+    fn first_meshes(&mut self, volume: &mut TerrainVolume, settings: &MarchlessSettings, until: Instant) {
+        let (limit, mut done) = (in_flight(settings), 0);
+        while volume.first_meshes < limit {
+            let TerrainVolume { chunks, pending, to_mesh, streaming, .. } = &mut *volume;
+            let waits = |key: &ChunkKey| {
+                chunks.get(key).is_some_and(ChunkState::is_ready)
+                    && !pending.iter().any(|pending| pending.chunks.contains(key))
+            };
+            let Some(key) = to_mesh.pop(streaming.ranges(), waits) else { break };
+            if volume.claims.contains_key(&key) {
+                volume.ready.push(key);
+                continue;
+            }
+            let urgency = volume.streaming.ranges().urgency(key.position);
+            let pending = Pending { chunks: BTreeSet::from([key]), since: None };
+            self.group(volume, pending, Priority::FirstMesh(urgency));
+            done += 1;
+            if done % 16 == 0 && Instant::now() >= until {
+                break;
+            }
+        }
     }
 
     /// Starts the changed chunks that no group is working on.

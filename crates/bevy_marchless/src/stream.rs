@@ -20,6 +20,7 @@
 //! }
 //! ```
 
+mod agenda;
 mod follow;
 mod look;
 mod range;
@@ -31,6 +32,7 @@ use bevy_math::{IVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
 
+pub(crate) use agenda::Agenda;
 pub(crate) use follow::{Streaming, ask_for_samples, follow_viewers, free_samples_for, in_flight};
 pub(crate) use range::Wanted;
 

@@ -1,6 +1,5 @@
 //! [`Streaming`]: what becomes of chunks when ranges change.
 
-use core::cmp::Reverse;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -12,6 +11,7 @@ use bevy_transform::components::GlobalTransform;
 use bevy_transform::helper::TransformHelper;
 use marchless::{Chunk, Region, Source};
 
+use super::agenda::Agenda;
 use super::look::Look;
 use super::range::{Range, Ranges, Viewed, Wanted};
 use super::{StreamStats, TerrainViewer};
@@ -38,13 +38,12 @@ pub(crate) struct Streaming {
     ranges: Ranges,
     /// The latest good range of each viewer, and what it was made from.
     viewers: HashMap<Entity, (TerrainViewer, Viewed)>,
-    /// Chunks that ranges may ask for; the most urgent last. Some several times, some no longer.
-    arriving: Vec<ChunkKey>,
+    /// Chunks that ranges may ask for.
+    arriving: Agenda,
     /// Chunks that ranges may no longer ask for.
     leaving: Vec<ChunkKey>,
-    /// Chunks that wait to be sampled; some no longer.
-    to_fill: Vec<ChunkKey>,
-    to_fill_is_sorted: bool,
+    /// Chunks that wait to be sampled.
+    to_fill: Agenda,
     /// How many jobs are sampling, or about to.
     asked: usize,
     /// What the source is certain of, box by box.
@@ -65,7 +64,7 @@ impl Streaming {
 
     /// Chunks whose lot is still to be decided.
     pub(crate) fn on_their_way(&self) -> impl Iterator<Item = ChunkKey> + '_ {
-        self.arriving.iter().copied()
+        self.arriving.iter()
     }
 
     /// Whether nothing is left to load, to unload or to fill.
@@ -75,7 +74,7 @@ impl Streaming {
 
     /// Notes that a chunk is to be looked at again.
     pub(crate) fn look_at(&mut self, key: ChunkKey) {
-        self.arriving.push(key);
+        self.arriving.add_first(key);
     }
 
     /// Forgets what is being filled: all loaded chunks are to be filled anew.
@@ -84,8 +83,7 @@ impl Streaming {
         self.boxes.clear();
         self.remote.clear();
         self.asked = 0;
-        self.arriving.extend(all);
-        self.sort();
+        all.for_each(|key| self.arriving.add(key));
     }
 
     /// Whether a job for a chunk that is not loaded has been asked for; it is done now.
@@ -100,15 +98,6 @@ impl Streaming {
         self.asked -= 1;
     }
 
-    /// Sorts the chunks whose lot is to be decided, and forgets those that nothing is to become of any more.
-    fn sort(&mut self) {
-        let ranges = &self.ranges;
-        self.arriving.retain(|key| ranges.wanted(key.position, Wanted::Samples) > Wanted::Gone);
-        self.arriving.sort_by_cached_key(|key| Reverse((ranges.urgency(key.position), *key)));
-        self.arriving.dedup();
-        self.to_fill_is_sorted = false;
-    }
-
     /// Takes new ranges, and notes which chunks they concern.
     fn change(&mut self, new: Ranges, is_loaded: impl Fn(&ChunkKey) -> bool) {
         let old = core::mem::replace(&mut self.ranges, new);
@@ -118,10 +107,17 @@ impl Streaming {
         let (arriving, leaving) = (&mut self.arriving, &mut self.leaving);
         self.ranges.differences(
             &old,
-            |position| arriving.push(ChunkKey::finest(position)),
+            |position| arriving.add(ChunkKey::finest(position)),
             |position| leaving.extend(Some(ChunkKey::finest(position)).filter(&is_loaded)),
         );
-        self.sort();
+        self.arriving.sort_again();
+        self.to_fill.sort_again();
+    }
+
+    /// The most urgent chunk whose lot is to be decided.
+    fn next_arriving(&mut self) -> Option<ChunkKey> {
+        let ranges = &self.ranges;
+        self.arriving.pop(ranges, |key| ranges.wanted(key.position, Wanted::Samples) > Wanted::Gone)
     }
 
     /// What the source is certain of without sampling. A source that panics is certain of nothing.
@@ -234,7 +230,7 @@ impl Follow<'_, '_, '_> {
         }
         let mut done = 0;
         while (done < LEAST || done % 8 != 0 || Instant::now() < until)
-            && let Some(key) = self.volume.streaming.arriving.pop()
+            && let Some(key) = self.volume.streaming.next_arriving()
         {
             self.settle(key, &asked);
             done += 1;
@@ -283,8 +279,7 @@ impl Follow<'_, '_, '_> {
             volume.take_samples(key, Some((chunk, signs)));
         } else if let Some(state) = volume.chunks.get_mut(&key) {
             state.fill = Fill::Waiting;
-            volume.streaming.to_fill.push(key);
-            volume.streaming.to_fill_is_sorted = false;
+            volume.streaming.to_fill.add(key);
         }
     }
 
@@ -403,7 +398,7 @@ impl TerrainVolume {
         {
             state.fill = Fill::Unasked;
             self.unfilled += 1;
-            self.streaming.arriving.push(key);
+            self.streaming.look_at(key);
         }
     }
 
@@ -455,20 +450,11 @@ pub(crate) fn ask_for_samples(
         let volume = &mut *volume;
         let Some(terrain) = &volume.settings else { continue };
         let streaming = &mut volume.streaming;
-        if !streaming.to_fill_is_sorted {
-            let (ranges, chunks) = (&streaming.ranges, &volume.chunks);
+        let chunks = &mut volume.chunks;
+        while streaming.asked < limit {
             let waits = |key: &ChunkKey| chunks.get(key).is_some_and(|state| matches!(state.fill, Fill::Waiting));
-            streaming.to_fill.retain(waits);
-            streaming.to_fill.sort_by_cached_key(|key| Reverse((ranges.urgency(key.position), *key)));
-            streaming.to_fill.dedup();
-            streaming.to_fill_is_sorted = true;
-        }
-        while streaming.asked < limit
-            && let Some(key) = streaming.to_fill.pop()
-        {
-            let Some(state) = volume.chunks.get_mut(&key).filter(|state| matches!(state.fill, Fill::Waiting)) else {
-                continue;
-            };
+            let Some(key) = streaming.to_fill.pop(&streaming.ranges, waits) else { break };
+            let Some(state) = chunks.get_mut(&key) else { break };
             let urgency = streaming.ranges.urgency(key.position);
             let ticket = fill_chunk(entity, terrain, volume.filling, key.position, urgency, &queue, &results);
             state.fill = Fill::Asked(ticket);
