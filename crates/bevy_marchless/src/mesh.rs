@@ -29,7 +29,7 @@ use job::{MeshJob, mesh_now};
 use crate::chunk::{ChunkGeometry, ChunkKey, mesh_bounds, new_chunk};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
 use crate::stats::{MainThread, Stats};
-use crate::stream::{StreamStats, Wanted, in_flight};
+use crate::stream::{ENTITY_TIME, StreamStats, Wanted, in_flight};
 use crate::terrain::{ChunkState, Group, Pending, TerrainVolume, same_samples};
 use crate::work::{Priority, Results, WorkQueue};
 
@@ -111,14 +111,15 @@ fn mesh_terrains(
     mut screen: Screen,
 ) {
     let start = main_thread.start();
-    let (mut bytes, until) = (0, main_thread.until(start, settings.main_thread));
+    let (mut bytes, mut shown, until) = (0, 0, main_thread.until(start, settings.main_thread));
     waiting.extend(results.0.take());
     for result in core::mem::take(&mut *waiting) {
         let MeshResult { terrain, group, .. } = result;
         let Ok((_, mut volume)) = volumes.get_mut(terrain) else { continue };
         let Some(unfinished) = volume.groups.get_mut(&group) else { continue };
         // New chunks may come one by one; an edit is shown as a whole.
-        if unfinished.withdrawable && (bytes > settings.upload_bytes || bytes > 0 && Instant::now() > until) {
+        let now = Instant::now() + shown * ENTITY_TIME;
+        if unfinished.withdrawable && (bytes > settings.upload_bytes || bytes > 0 && now > until) {
             waiting.push(result);
             continue;
         }
@@ -130,10 +131,12 @@ fn mesh_terrains(
             && let Some(group) = volume.take_group(group)
         {
             show_group(terrain, &mut volume, group, &mut screen);
+            shown += 1;
         }
     }
+    let until = until.checked_sub(shown * ENTITY_TIME).unwrap_or(until);
     for (terrain, mut volume) in &mut volumes {
-        if !volume.ready.is_empty() || !volume.to_mesh.is_empty() || !volume.pending.is_empty() {
+        if !volume.ready.is_empty() || !volume.streaming.to_mesh.is_empty() || !volume.pending.is_empty() {
             let mut start = Start { terrain, queue: &queue, results: &results, screen: &mut screen, inline: 0 };
             start.ready_chunks(&mut volume, until);
             start.first_meshes(&mut volume, &settings, until);
@@ -186,7 +189,7 @@ impl Start<'_, '_, '_> {
                     no_longer_drawn.insert(key);
                 }
             } else {
-                volume.to_mesh.add(key);
+                volume.streaming.add_to_mesh(key);
             }
             done += 1;
             if done % 16 == 0 && Instant::now() >= until {
@@ -201,12 +204,12 @@ impl Start<'_, '_, '_> {
     fn first_meshes(&mut self, volume: &mut TerrainVolume, settings: &MarchlessSettings, until: Instant) {
         let (limit, mut done) = (in_flight(settings), 0);
         while volume.first_meshes < limit {
-            let TerrainVolume { chunks, pending, to_mesh, streaming, .. } = &mut *volume;
+            let TerrainVolume { chunks, pending, streaming, .. } = &mut *volume;
             let waits = |key: &ChunkKey| {
                 chunks.get(key).is_some_and(ChunkState::is_ready)
                     && !pending.iter().any(|pending| pending.chunks.contains(key))
             };
-            let Some(key) = to_mesh.pop(streaming.ranges(), waits) else { break };
+            let Some(key) = streaming.next_to_mesh(waits) else { break };
             if volume.claims.contains_key(&key) {
                 volume.ready.push(key);
                 continue;

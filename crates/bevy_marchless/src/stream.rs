@@ -32,8 +32,7 @@ use bevy_math::{IVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
 
-pub(crate) use agenda::Agenda;
-pub(crate) use follow::{Streaming, ask_for_samples, follow_viewers, free_samples_for, in_flight};
+pub(crate) use follow::{ENTITY_TIME, Streaming, ask_for_samples, follow_viewers, free_samples_for, in_flight};
 pub(crate) use range::Wanted;
 
 /// Loads the chunks of all terrains around its entity.

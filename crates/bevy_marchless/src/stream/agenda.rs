@@ -5,92 +5,115 @@ use core::cmp::Reverse;
 use super::range::Ranges;
 use crate::chunk::ChunkKey;
 
-/// So many chunks are sorted at once; who comes after them is not asked before.
+/// So many chunks are sorted at once.
 const SOON: usize = 256;
-/// As many chunks may be on an agenda without being gone through for those that no longer wait.
+/// As many chunks may wait without being gone through for those that no longer do.
 const FEW: usize = 1024;
 
 /// Chunks that wait for something; some several times, some no longer.
 ///
-/// Thousands may wait while few of them have their turn, and what is urgent changes with every step of a viewer. So only
+/// Thousands may wait while few of them have their turn, and what is urgent changes with the steps of a viewer. So only
 /// those that come soon are sorted.
 #[derive(Debug)]
 pub(crate) struct Agenda {
-    /// The last ones come first, as far as they are sorted.
-    keys: Vec<ChunkKey>,
-    sorted: usize,
-    /// When it has so many chunks, those that no longer wait are taken out.
+    /// The most urgent ones, the first at the end.
+    soon: Vec<(Reverse<u32>, Reverse<ChunkKey>)>,
+    is_sorted: bool,
+    later: Vec<ChunkKey>,
+    /// None that comes later is more urgent. The lower, the sooner.
+    bar: u32,
+    /// When so many come later, those that no longer wait are taken out.
     tidied_at: usize,
 }
 
 impl Default for Agenda {
     fn default() -> Self {
-        Self { keys: Vec::new(), sorted: 0, tidied_at: FEW }
+        Self { soon: Vec::new(), is_sorted: true, later: Vec::new(), bar: 0, tidied_at: FEW }
     }
 }
 
 impl Agenda {
     pub(crate) fn is_empty(&self) -> bool {
-        self.keys.is_empty()
+        self.len() == 0
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.keys.len()
+        self.soon.len() + self.later.len()
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = ChunkKey> + '_ {
-        self.keys.iter().copied()
+        self.soon.iter().map(|(_, Reverse(key))| *key).chain(self.later.iter().copied())
     }
 
     pub(crate) fn clear(&mut self) {
-        self.keys.clear();
+        *self = Self::default();
     }
 
     /// Adds a chunk, which comes when it is its turn.
-    pub(crate) fn add(&mut self, key: ChunkKey) {
-        self.keys.push(key);
-        self.sorted = 0;
+    pub(crate) fn add(&mut self, key: ChunkKey, ranges: &Ranges) {
+        let urgency = ranges.urgency(key.position);
+        if urgency < self.bar {
+            self.soon.push((Reverse(urgency), Reverse(key)));
+            self.is_sorted = false;
+        } else {
+            self.later.push(key);
+        }
     }
 
     /// Adds a chunk, which comes before all others.
     pub(crate) fn add_first(&mut self, key: ChunkKey) {
-        self.keys.push(key);
-        self.sorted += 1;
+        self.soon.push((Reverse(0), Reverse(key)));
+        self.is_sorted = false;
+    }
+
+    /// Adds a chunk; what is urgent is another question now.
+    pub(crate) fn add_unsorted(&mut self, key: ChunkKey) {
+        self.later.push(key);
     }
 
     /// Notes that it has become another question what is urgent.
     pub(crate) fn sort_again(&mut self) {
-        self.sorted = 0;
+        self.later.extend(self.soon.drain(..).map(|(_, Reverse(key))| key));
+        self.bar = 0;
     }
 
     /// Takes out the most urgent chunk that still `waits`.
     pub(crate) fn pop(&mut self, ranges: &Ranges, waits: impl Fn(&ChunkKey) -> bool) -> Option<ChunkKey> {
         loop {
-            if self.sorted == 0 {
-                self.sort(ranges, &waits);
+            if self.soon.len() > 2 * SOON {
+                self.sort_again();
             }
-            let key = self.keys.pop()?;
-            self.sorted -= 1;
+            if self.soon.is_empty() {
+                self.choose(ranges, &waits);
+            }
+            if !self.is_sorted {
+                self.soon.sort_unstable();
+                self.is_sorted = true;
+            }
+            let (_, Reverse(key)) = self.soon.pop()?;
             if waits(&key) {
                 return Some(key);
             }
         }
     }
 
-    fn sort(&mut self, ranges: &Ranges, waits: impl Fn(&ChunkKey) -> bool) {
-        if self.keys.len() >= self.tidied_at {
-            self.keys.retain(waits);
-            self.tidied_at = 2 * self.keys.len() + FEW;
+    /// Chooses who comes soon from all that come later.
+    fn choose(&mut self, ranges: &Ranges, waits: impl Fn(&ChunkKey) -> bool) {
+        if self.later.len() >= self.tidied_at {
+            self.later.retain(waits);
+            self.tidied_at = 2 * self.later.len() + FEW;
         }
-        let mut order: Vec<_> = self.keys.iter().map(|key| Reverse((ranges.urgency(key.position), *key))).collect();
-        let later = order.len().saturating_sub(SOON);
-        if later > 0 {
-            order.select_nth_unstable(later);
+        let urgency = ranges.urgencies();
+        self.soon.extend(self.later.drain(..).map(|key| (Reverse(urgency(key.position)), Reverse(key))));
+        self.is_sorted = false;
+        let most = self.soon.len().saturating_sub(SOON);
+        if most > 0 {
+            let (_, (Reverse(bar), _), _) = self.soon.select_nth_unstable(most);
+            self.bar = *bar;
+            self.later.extend(self.soon.drain(..most).map(|(_, Reverse(key))| key));
+        } else {
+            self.bar = u32::MAX;
         }
-        order[later..].sort_unstable();
-        self.keys.clear();
-        self.keys.extend(order.into_iter().map(|Reverse((_, key))| key));
-        self.sorted = self.keys.len() - later;
     }
 }
 
@@ -118,7 +141,7 @@ mod tests {
             let ranges = ranges();
             let mut agenda = Agenda::default();
             let waits = |key: &ChunkKey| key.position[0] != 3;
-            positions.iter().for_each(|position| agenda.add(ChunkKey::finest(*position)));
+            positions.iter().for_each(|position| agenda.add(ChunkKey::finest(*position), &ranges));
             let mut expected: BTreeSet<_> =
                 positions.iter().map(|position| (ranges.urgency(*position), *position)).collect();
             expected.retain(|(_, position)| position[0] != 3);
@@ -128,7 +151,7 @@ mod tests {
             }
             // What is added in between finds its place.
             if let Some(key) = agenda.pop(&ranges, waits) {
-                agenda.add(key);
+                agenda.add(key, &ranges);
             }
             let mut found: Vec<_> = core::iter::from_fn(|| agenda.pop(&ranges, waits))
                 .map(|key| (ranges.urgency(key.position), key.position))

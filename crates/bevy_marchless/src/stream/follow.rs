@@ -1,5 +1,6 @@
 //! [`Streaming`]: what becomes of chunks when ranges change.
 
+use core::time::Duration;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -44,6 +45,10 @@ pub(crate) struct Streaming {
     leaving: Vec<ChunkKey>,
     /// Chunks that wait to be sampled.
     to_fill: Agenda,
+    /// Chunks with a surface, and all samples around it, that wait to be meshed for the first time.
+    pub(crate) to_mesh: Agenda,
+    /// The ranges that told what is urgent on these agendas.
+    urgent_for: Ranges,
     /// How many jobs are sampling, or about to.
     asked: usize,
     /// What the source is certain of, box by box.
@@ -80,10 +85,11 @@ impl Streaming {
     /// Forgets what is being filled: all loaded chunks are to be filled anew.
     pub(crate) fn refill(&mut self, all: impl Iterator<Item = ChunkKey>) {
         self.to_fill.clear();
+        self.to_mesh.clear();
         self.boxes.clear();
         self.remote.clear();
         self.asked = 0;
-        all.for_each(|key| self.arriving.add(key));
+        all.for_each(|key| self.arriving.add(key, &self.ranges));
     }
 
     /// Whether a job for a chunk that is not loaded has been asked for; it is done now.
@@ -91,6 +97,16 @@ impl Streaming {
         let found = self.remote.remove(&position).is_some();
         self.asked -= usize::from(found);
         found
+    }
+
+    /// Notes that a chunk is to be meshed for the first time.
+    pub(crate) fn add_to_mesh(&mut self, key: ChunkKey) {
+        self.to_mesh.add(key, &self.ranges);
+    }
+
+    /// The most urgent chunk that is to be meshed for the first time, and still `waits` for that.
+    pub(crate) fn next_to_mesh(&mut self, waits: impl Fn(&ChunkKey) -> bool) -> Option<ChunkKey> {
+        self.to_mesh.pop(&self.ranges, waits)
     }
 
     /// Notes that a job that samples is done or no longer wanted.
@@ -104,14 +120,16 @@ impl Streaming {
         // What was dropped once has to come back some time.
         self.drops |= self.ranges.0.iter().any(|viewed| viewed.samples.is_some());
         self.may_drop_more |= self.drops;
-        let (arriving, leaving) = (&mut self.arriving, &mut self.leaving);
-        self.ranges.differences(
+        let Self { ranges, arriving, leaving, .. } = self;
+        ranges.differences(
             &old,
-            |position| arriving.add(ChunkKey::finest(position)),
+            |position| arriving.add_unsorted(ChunkKey::finest(position)),
             |position| leaving.extend(Some(ChunkKey::finest(position)).filter(&is_loaded)),
         );
-        self.arriving.sort_again();
-        self.to_fill.sort_again();
+        if self.ranges.differ_in_urgency(&self.urgent_for) {
+            self.urgent_for = self.ranges.clone();
+            [&mut self.arriving, &mut self.to_fill, &mut self.to_mesh].into_iter().for_each(Agenda::sort_again);
+        }
     }
 
     /// The most urgent chunk whose lot is to be decided.
@@ -194,7 +212,7 @@ pub(crate) fn follow_viewers(
         }
         if !volume.streaming.arriving.is_empty() || !volume.streaming.leaving.is_empty() {
             let until = main_thread.until(start, settings.main_thread / 2);
-            let mut follow = Follow { volume: &mut volume, commands: &mut commands, stats: &mut stats };
+            let mut follow = Follow { volume: &mut volume, commands: &mut commands, stats: &mut stats, despawned: 0 };
             follow.go_on(until);
         }
     }
@@ -206,7 +224,12 @@ struct Follow<'a, 'w, 's> {
     volume: &'a mut TerrainVolume,
     commands: &'a mut Commands<'w, 's>,
     stats: &'a mut StreamStats,
+    /// How many entities are to be despawned.
+    despawned: u32,
 }
+
+/// About how long it takes to spawn or despawn a chunk's entity, which commands do later.
+pub(crate) const ENTITY_TIME: Duration = Duration::from_micros(10);
 
 impl Follow<'_, '_, '_> {
     /// Goes through chunks, those that are wanted first, until it is late.
@@ -222,14 +245,14 @@ impl Follow<'_, '_, '_> {
         // At least as many may go as come, so that there are never more than the ranges hold and what is on its way out.
         let half = Instant::now() + until.saturating_duration_since(Instant::now()) / 2;
         let mut done = 0;
-        while (done < 2 * LEAST || done % 8 != 0 || Instant::now() < half)
+        while (done < 2 * LEAST || done % 8 != 0 || Instant::now() + self.despawned * ENTITY_TIME < half)
             && let Some(key) = self.volume.streaming.leaving.pop()
         {
             self.settle(key, &asked);
             done += 1;
         }
         let mut done = 0;
-        while (done < LEAST || done % 8 != 0 || Instant::now() < until)
+        while (done < LEAST || done % 8 != 0 || Instant::now() + self.despawned * ENTITY_TIME < until)
             && let Some(key) = self.volume.streaming.next_arriving()
         {
             self.settle(key, &asked);
@@ -279,7 +302,8 @@ impl Follow<'_, '_, '_> {
             volume.take_samples(key, Some((chunk, signs)));
         } else if let Some(state) = volume.chunks.get_mut(&key) {
             state.fill = Fill::Waiting;
-            volume.streaming.to_fill.add(key);
+            let Streaming { to_fill, ranges, .. } = &mut volume.streaming;
+            to_fill.add(key, ranges);
         }
     }
 
@@ -317,6 +341,7 @@ impl Follow<'_, '_, '_> {
         (state.drawn, state.empty, state.stale, state.hidden) = (false, true, false, false);
         if let Some(entity) = state.entity.take() {
             self.commands.entity(entity).try_despawn();
+            self.despawned += 1;
         }
     }
 

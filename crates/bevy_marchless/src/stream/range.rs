@@ -71,18 +71,6 @@ impl Range {
         Self { radii: self.radii.map(|radius| radius * factor), ..self }
     }
 
-    /// The square of how far a chunk is from the middle, in chunks, where half the ellipsoid's axes are equal; with other
-    /// axes, scaled to the longest.
-    pub(crate) fn squared_distance(&self, position: [i32; 3]) -> f64 {
-        let longest = self.longest();
-        (0..3)
-            .map(|axis| {
-                let offset = f64::from(position[axis]) + 0.5 - self.middle[axis];
-                (offset * (longest / self.radii[axis].max(1e-9))).powi(2)
-            })
-            .sum()
-    }
-
     /// From the middle to a chunk's middle, in chunks.
     pub(crate) fn offset(&self, position: [i32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| f64::from(position[axis]) + 0.5 - self.middle[axis])
@@ -185,6 +173,20 @@ impl Viewed {
         [Some(stays.grown(0.0)), Some(stays.grown(1.0)), samples]
     }
 
+    /// The square of how far chunks are from the viewer, in chunks, and farther where they are behind it. Where the
+    /// ellipsoid's axes are not equal, distances are scaled to the longest.
+    fn urgency(&self) -> impl Fn([i32; 3]) -> f64 + use<> {
+        let Self { range, forward, .. } = *self;
+        let scale = range.radii.map(|radius| range.longest() / radius.max(1e-9));
+        move |position| {
+            let offset = range.offset(position);
+            let distance: f64 = (0..3).map(|axis| (offset[axis] * scale[axis]).powi(2)).sum();
+            let ahead: f64 = (0..3).map(|axis| offset[axis] * forward[axis]).sum();
+            // What is close may be turned to in no time.
+            if ahead < 0.0 && distance > 4.0 { 2.0 * distance } else { distance }
+        }
+    }
+
     fn has_borders_of(&self, other: &Self) -> bool {
         Self { forward: other.forward, ..*self } == *other
     }
@@ -232,14 +234,22 @@ impl Ranges {
 
     /// What comes first: the lower, the sooner. Near before far, and in front before behind.
     pub(crate) fn urgency(&self, position: [i32; 3]) -> u32 {
-        let of_viewer = |viewed: &Viewed| {
-            let distance = viewed.range.squared_distance(position);
-            let offset = viewed.range.offset(position);
-            let ahead: f64 = (0..3).map(|axis| offset[axis] * viewed.forward[axis]).sum();
-            // What is close may be turned to in no time.
-            if ahead < 0.0 && distance > 4.0 { 2.0 * distance } else { distance }
+        as_number(self.0.iter().map(|viewed| viewed.urgency()(position)))
+    }
+
+    /// [`urgency`](Self::urgency), for many chunks.
+    pub(crate) fn urgencies(&self) -> impl Fn([i32; 3]) -> u32 {
+        let of_viewers: Vec<_> = self.0.iter().map(Viewed::urgency).collect();
+        move |position| as_number(of_viewers.iter().map(|of| of(position)))
+    }
+
+    /// Whether other chunks may be urgent for these ranges than for `old` ones.
+    pub(crate) fn differ_in_urgency(&self, old: &Self) -> bool {
+        let far = |(new, old): (&Viewed, &Viewed)| {
+            let [new_middle, old_middle] = [new, old].map(|viewed| viewed.range.middle);
+            new.forward != old.forward || (0..3).any(|axis| (new_middle[axis] - old_middle[axis]).abs() >= 0.5)
         };
-        (16.0 * self.0.iter().map(of_viewer).fold(f64::INFINITY, f64::min)) as u32
+        self.0.len() != old.0.len() || self.0.iter().zip(&old.0).any(far)
     }
 
     /// The chunks that come into these ranges from `old` ones, and those that go out of the old ones.
@@ -255,6 +265,11 @@ impl Ranges {
             difference(borders(old, Viewed::exits), borders(new, Viewed::exits), &mut go);
         }
     }
+}
+
+/// The least of all viewers' urgencies, as a number that can be sorted by.
+fn as_number(urgencies: impl Iterator<Item = f64>) -> u32 {
+    (16.0 * urgencies.fold(f64::INFINITY, f64::min)) as u32
 }
 
 /// What is in ranges and not in others, border by border. The second border is around the first.

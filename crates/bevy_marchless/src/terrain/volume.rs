@@ -14,7 +14,7 @@ use crate::bits::BitsCache;
 use crate::chunk::ChunkKey;
 use crate::mesh::{Colors, Meshed};
 use crate::stats::Since;
-use crate::stream::{Agenda, Coverage, Leaf, LeafState, Streaming, Wanted};
+use crate::stream::{Coverage, Leaf, LeafState, Streaming, Wanted};
 use crate::work::{Ticket, new_number};
 
 /// A terrain's samples. The plugin fills and changes them; read them here, change them with
@@ -61,9 +61,6 @@ pub struct TerrainVolume {
     /// Chunks whose surroundings are filled, but which have not been meshed since; some twice, some no longer.
     #[reflect(ignore)]
     pub(crate) ready: Vec<ChunkKey>,
-    /// Those of them that take meshing, which waits for its turn.
-    #[reflect(ignore)]
-    pub(crate) to_mesh: Agenda,
     /// How many chunks are being meshed for the first time.
     #[reflect(ignore)]
     pub(crate) first_meshes: usize,
@@ -156,7 +153,6 @@ impl Default for TerrainVolume {
             filling: 0,
             unfilled: 0,
             ready: Vec::new(),
-            to_mesh: Agenda::default(),
             first_meshes: 0,
             pending: Vec::new(),
             groups: BTreeMap::new(),
@@ -229,7 +225,7 @@ impl TerrainVolume {
 
     /// Whether all chunks in range have their samples and everything is drawn as it is.
     pub fn is_settled(&self) -> bool {
-        let nothing_to_mesh = self.ready.is_empty() && self.to_mesh.is_empty() && self.pending.is_empty();
+        let nothing_to_mesh = self.ready.is_empty() && self.streaming.to_mesh.is_empty() && self.pending.is_empty();
         self.is_filled() && nothing_to_mesh && self.groups.is_empty()
     }
 
@@ -280,7 +276,7 @@ impl TerrainVolume {
     pub(crate) fn waiting_for_meshes(&self) -> usize {
         let pending = self.pending.iter().map(|pending| pending.chunks.len());
         let in_groups = self.groups.values().map(|group| group.members - group.meshed.len());
-        self.ready.len() + self.to_mesh.len() + pending.sum::<usize>() + in_groups.sum::<usize>()
+        self.ready.len() + self.streaming.to_mesh.len() + pending.sum::<usize>() + in_groups.sum::<usize>()
     }
 
     /// Notes that chunks have changed; sets that overlap become one.
@@ -382,7 +378,6 @@ impl TerrainVolume {
     /// Forgets all groups and all that waits to be meshed; jobs that have not begun are withdrawn.
     pub(crate) fn forget_work(&mut self) {
         self.ready.clear();
-        self.to_mesh.clear();
         self.pending.clear();
         self.groups.clear();
         self.claims.clear();
