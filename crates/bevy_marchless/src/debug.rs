@@ -40,7 +40,7 @@ impl DebugPlugin {
     /// How long the plugin's systems took in an update, in milliseconds.
     pub const MAIN_THREAD: DiagnosticPath = DiagnosticPath::const_new("marchless/main_thread");
     /// How much memory samples and geometry take, in bytes. Samples are gone through a part at a time, so that it lags an
-    /// update behind for every 128 chunks that have some.
+    /// update behind for every 32 chunks that have some.
     pub const RESIDENT_BYTES: DiagnosticPath = DiagnosticPath::const_new("marchless/resident_bytes");
     /// The same, divided by how many chunks have something to draw.
     pub const BYTES_PER_SURFACE_CHUNK: DiagnosticPath = DiagnosticPath::const_new("marchless/bytes_per_surface_chunk");
@@ -117,7 +117,7 @@ struct Sweep {
 }
 
 /// So many chunks of a volume are looked at per update.
-const SWEPT: usize = 128;
+const SWEPT: usize = 32;
 
 impl Sweep {
     fn go_on(&mut self, volume: &TerrainVolume) {

@@ -20,7 +20,7 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
 use bevy_platform::time::Instant;
-use marchless::MeshBuffer;
+use marchless::{Chunk, Grid, MeshBuffer};
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
 pub(crate) use job::{Colors, Meshed};
@@ -147,6 +147,11 @@ fn mesh_terrains(
     main_thread.stop(start);
 }
 
+/// Whether a chunk and all around it are certainly of one kind: that is asked without touching shared samples.
+fn is_uniform_around(grid: &Grid<i16>, position: [i32; 3]) -> bool {
+    !matches!(grid.chunk(position), Some(Chunk::Samples(_))) && grid.neighbourhood(position).is_uniform()
+}
+
 /// How many bytes a mesh takes, in memory and, or about so, on the graphics card.
 pub(crate) fn geometry_bytes(mesh: &MeshBuffer) -> usize {
     size_of_val(&mesh.positions[..])
@@ -178,7 +183,7 @@ impl Start<'_, '_, '_> {
             }
             if volume.claims.contains_key(&key) {
                 later.push(key);
-            } else if volume.is_without_surface(key) || volume.grid.neighbourhood(key.position).is_uniform() {
+            } else if volume.is_without_surface(key) || is_uniform_around(&volume.grid, key.position) {
                 if let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.empty) {
                     (state.drawn, state.stale) = (true, false);
                     volume.streaming.may_drop_more = true;
@@ -272,7 +277,12 @@ impl Start<'_, '_, '_> {
             }
             group.members += 1;
             for neighbour in key.around() {
-                if let Some(chunk) = volume.grid.chunk(neighbour.position) {
+                let is_shown_as_it_is = |chunk| {
+                    let is_drawn = volume.chunks.get(&neighbour).is_some_and(|state| state.drawn);
+                    is_drawn && !group.chunks.contains(&neighbour)
+                        || volume.shown.chunk(neighbour.position).is_some_and(|shown| same_samples(shown, chunk))
+                };
+                if let Some(chunk) = volume.grid.chunk(neighbour.position).filter(|chunk| !is_shown_as_it_is(*chunk)) {
                     group.snapshot.entry(neighbour.position).or_insert_with(|| chunk.clone());
                 }
             }

@@ -94,7 +94,7 @@ impl Flight {
         let (time, main_thread) = (start.elapsed(), times.iter().sum());
         times.sort();
         // Memory is measured bit by bit.
-        for _ in 0..200 {
+        for _ in 0..1_000 {
             app.update();
         }
         let diagnostic = |path: &DiagnosticPath| {
