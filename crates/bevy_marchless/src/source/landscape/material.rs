@@ -163,22 +163,21 @@ impl RowRules<'_> {
             let most_up = if steeper <= 0.0 { f32::INFINITY } else { (1.0 / (1.0 + steeper * steeper).sqrt()) as f32 };
             let highest = -stratum.below_depth as f32;
             let material = i32::from(stratum.material);
-            let holds = |index: usize, chosen: i32| {
-                (chosen == UNDECIDED) & (distances[index] <= highest) & (ups[index] <= most_up)
-            };
+            let holds =
+                |chosen: i32, distance: f32, up: f32| (chosen == UNDECIDED) & (distance <= highest) & (up <= most_up);
             if let Some((octaves, above)) = patches {
-                if (0..len).any(|index| holds(index, chosen[index])) {
+                if (0..len).any(|index| holds(chosen[index], distances[index], ups[index])) {
                     *calls += octaves.row_3d(self.xs, line.y, line.z, &mut self.noise);
                     for (index, chosen) in chosen.iter_mut().enumerate() {
-                        if holds(index, *chosen) && f64::from(self.noise.value[index]) > *above {
+                        if holds(*chosen, distances[index], ups[index]) && f64::from(self.noise.value[index]) > *above {
                             *chosen = material;
                         }
                     }
                 }
                 continue;
             }
-            for index in 0..len {
-                chosen[index] = if holds(index, chosen[index]) { material } else { chosen[index] };
+            for ((chosen, distance), up) in chosen.iter_mut().zip(distances).zip(ups) {
+                *chosen = if holds(*chosen, *distance, *up) { material } else { *chosen };
             }
         }
         for (material, chosen) in materials.iter_mut().zip(chosen) {
