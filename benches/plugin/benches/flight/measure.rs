@@ -7,8 +7,9 @@ use bevy_asset::AssetPlugin;
 use bevy_diagnostic::{DiagnosticPath, DiagnosticsPlugin, DiagnosticsStore};
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::SingleThreadedExecutor;
+use bevy_marchless::marchless::Chunk;
 use bevy_marchless::prelude::*;
-use bevy_math::Vec3;
+use bevy_math::{IVec3, Vec3};
 use bevy_mesh::MeshPlugin;
 use bevy_transform::{TransformPlugin, TransformSystems};
 
@@ -125,7 +126,9 @@ pub(crate) fn long_flight(minutes: u32) -> String {
     let route = &ROUTES[0];
     let (mut app, terrain) = world_app(World::Hills);
     let viewer = app.world_mut().spawn((TerrainViewer::new(RADIUS), route.transform(0, 0))).id();
-    let mut text = String::from("| minute | resident MB | p99 ms | max ms | chunks loaded |\n|---|---|---|---|---|\n");
+    let mut text = String::from(
+        "| minute | resident MB | of it edits | p99 ms | max ms | chunks loaded |\n|---|---|---|---|---|---|\n",
+    );
     let mut times = Vec::new();
     for update in 0..minutes * 60 * PACE {
         app.world_mut().entity_mut(viewer).insert(route.transform(update, 0));
@@ -138,9 +141,10 @@ pub(crate) fn long_flight(minutes: u32) -> String {
         if (update + 1) % (60 * PACE) == 0 {
             times.sort();
             let row = format!(
-                "| {} | {:.1} | {:.3} | {:.3} | {} |",
+                "| {} | {:.1} | {:.1} | {:.3} | {:.3} | {} |",
                 (update + 1) / (60 * PACE),
                 resident_bytes() as f64 / 1e6,
+                edited_bytes(volume(&app, terrain)) as f64 / 1e6,
                 times[times.len() * 99 / 100].as_secs_f64() * 1e3,
                 times[times.len() - 1].as_secs_f64() * 1e3,
                 app.world().resource::<StreamStats>().loaded,
@@ -152,6 +156,16 @@ pub(crate) fn long_flight(minutes: u32) -> String {
         }
     }
     text
+}
+
+/// How many bytes the samples of chunks take that are kept for their edits alone.
+fn edited_bytes(volume: &TerrainVolume) -> usize {
+    let kept = volume.grid().chunks().filter(|(position, _)| volume.leaf_at(IVec3::from(*position)).is_none());
+    kept.map(|(_, chunk)| match chunk {
+        Chunk::Uniform(_) => 0,
+        Chunk::Samples(samples) => 2 * samples.weights.len() + samples.materials.len(),
+    })
+    .sum()
 }
 
 fn world_app(world: World) -> (App, Entity) {

@@ -66,7 +66,7 @@ impl Agenda {
         self.is_sorted = false;
     }
 
-    /// Adds a chunk; what is urgent is another question now.
+    /// Adds a chunk, which comes after all that are chosen already, however urgent it is.
     pub(crate) fn add_unsorted(&mut self, key: ChunkKey) {
         self.later.push(key);
     }
