@@ -266,12 +266,7 @@ impl Follow<'_, '_, '_> {
         let wanted = self.volume.streaming.ranges.wanted(key.position, now);
         match (now, wanted) {
             (Wanted::Gone, Wanted::Gone) => return,
-            (Wanted::Gone, _) => {
-                let missing = self.volume.missing_around(key, asked.extent);
-                self.volume.chunks.insert(key, ChunkState::new(wanted, missing));
-                self.volume.unfilled += 1;
-                self.stats.loaded += 1;
-            }
+            (Wanted::Gone, _) => self.load(key, wanted, asked),
             (_, Wanted::Gone) => return self.unload(key),
             (Wanted::Samples, Wanted::Mesh) => {
                 let Some(state) = self.volume.chunks.get_mut(&key) else { return };
@@ -281,13 +276,36 @@ impl Follow<'_, '_, '_> {
                 }
             }
             (Wanted::Mesh, Wanted::Samples) => self.hide(key),
-            (Wanted::Samples, Wanted::Samples) | (Wanted::Mesh, Wanted::Mesh) => {}
+            (Wanted::Mesh, Wanted::Mesh) => self.load_lost_neighbours(key, asked),
+            (Wanted::Samples, Wanted::Samples) => {}
         }
         if self.volume.streaming.drops {
             self.drop_or_revive(key);
         }
         if self.volume.chunks.get(&key).is_some_and(|state| matches!(state.fill, Fill::Unasked)) {
             self.fill(key, asked);
+        }
+    }
+
+    fn load(&mut self, key: ChunkKey, wanted: Wanted, asked: &Asked) {
+        let missing = self.volume.missing_around(key, asked.extent);
+        self.volume.chunks.insert(key, ChunkState::new(wanted, missing));
+        self.volume.unfilled += 1;
+        self.stats.loaded += 1;
+    }
+
+    /// Loads neighbours of a chunk that stays for the margin's sake alone, where they went before the ranges came back:
+    /// nobody else would, and edits of the chunk would wait for them for ever.
+    fn load_lost_neighbours(&mut self, key: ChunkKey, asked: &Asked) {
+        if self.volume.chunks.get(&key).is_none_or(|state| state.missing == 0) {
+            return;
+        }
+        for near in key.around().filter(|near| asked.extent.contains(near.position)) {
+            let wanted = self.volume.streaming.ranges.wanted(near.position, Wanted::Samples);
+            if wanted > Wanted::Gone && !self.volume.chunks.contains_key(&near) {
+                self.load(near, wanted, asked);
+                self.fill(near, asked);
+            }
         }
     }
 
