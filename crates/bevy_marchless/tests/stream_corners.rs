@@ -180,3 +180,22 @@ fn flat_worlds_drop_samples_too() {
         .count();
     assert!(far > 0);
 }
+
+/// Some neighbours of a drawn chunk are unloaded already when its viewer comes back, but not so near that they are asked for.
+#[test]
+fn edits_show_beside_neighbours_that_went() {
+    for away in 1..24 {
+        let mut app = app();
+        app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::ZERO;
+        let terrain = app.world_mut().spawn(world()).id();
+        let viewer = TerrainViewer::new(32.0).with_margin(16.0);
+        let viewer = app.world_mut().spawn((viewer, Transform::default())).id();
+        settle(&mut app, terrain);
+        move_to(&mut app, viewer, Vec3::new(-10_000.0, 0.0, 0.0));
+        (0..away).for_each(|_| app.update());
+        move_to(&mut app, viewer, Vec3::new(-12.0, 0.0, 0.0));
+        app.update();
+        app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::new(26.0, 0.0, 0.0), 14.0)));
+        settle(&mut app, terrain);
+    }
+}
