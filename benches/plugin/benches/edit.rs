@@ -3,6 +3,8 @@
 //!
 //! The terrain is the default one of 8 × 4 × 8 chunks of 32 cells, filled with hills. Each stroke digs a ball
 //! into the surface and fills it again, so that the terrain stays as it is. Beside it stands an update in which nothing happens.
+//!
+//! And the ray that finds the ground for it, in an endless world of which a viewer sees 8 chunks far.
 
 use std::hint::black_box;
 
@@ -12,18 +14,18 @@ use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_mesh::{Mesh3d, MeshPlugin};
-use bevy_transform::TransformPlugin;
+use bevy_transform::{TransformPlugin, components::Transform};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// Where the ball is dug, in voxels: in the middle of a chunk, and where eight chunks meet.
 const PLACES: [(&str, [f32; 2]); 2] =
     [("within one column of chunks", [112.0, 112.0]), ("where columns meet", [128.0, 128.0])];
 
-fn settled_app() -> (App, Entity) {
+fn settled_app(terrain: Terrain) -> (App, Entity) {
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, AssetPlugin::default(), MeshPlugin, MarchlessPlugins));
-    let source = NoiseHeights::from_seed(1);
-    let terrain = app.world_mut().spawn(Terrain::new(source)).id();
+    let terrain = app.world_mut().spawn(terrain).id();
+    app.world_mut().spawn((Transform::from_xyz(0.0, 80.0, 0.0), TerrainViewer::new(256.0)));
     for _ in 0..100_000 {
         app.update();
         if app.world().get::<TerrainVolume>(terrain).is_some_and(TerrainVolume::is_settled) {
@@ -42,8 +44,15 @@ fn surface(app: &App, terrain: Entity, [x, z]: [f32; 2]) -> f32 {
         as f32
 }
 
+fn ray(criterion: &mut Criterion) {
+    let (app, terrain) = settled_app(Terrain::endless(NoiseHeights::from_seed(1)));
+    criterion.bench_function("ray/to the ground of an endless world", |bencher| {
+        bencher.iter(|| surface(&app, terrain, black_box([112.0, 112.0])));
+    });
+}
+
 fn edit(criterion: &mut Criterion) {
-    let (mut app, terrain) = settled_app();
+    let (mut app, terrain) = settled_app(Terrain::new(NoiseHeights::from_seed(1)));
     let meshes = app.world_mut().query::<&Mesh3d>().iter(app.world()).count();
     println!("{meshes} chunks with a mesh");
     let mut group = criterion.benchmark_group("edit");
@@ -67,5 +76,5 @@ fn edit(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, edit);
+criterion_group!(benches, ray, edit);
 criterion_main!(benches);

@@ -310,7 +310,7 @@ impl<W: Weight> Grid<W> {
     }
 
     /// The chunk positions that may be present: the bounds, or all whose blocks fit in `i32`.
-    fn limits(&self) -> Region {
+    pub(crate) fn limits(&self) -> Region {
         self.bounds.unwrap_or_else(|| Self::largest(self.cells))
     }
 

@@ -65,7 +65,6 @@ pub fn ray_cast<W: Weight>(
     }
     let ray = Ray::new(origin, direction, max_distance)?;
     let cells = i64::from(grid.chunk_cells());
-    let drawn = drawn_chunks(grid);
     let hit = |chunk| {
         let surface = Surface::new(grid, chunk, isovalue);
         if surface.is_empty() {
@@ -73,21 +72,25 @@ pub fn ray_cast<W: Weight>(
         }
         ray.walk(grid.chunk_region(chunk), 1).find_map(|cell| surface.hit(&ray, cell))
     };
-    let positions = drawn.size().into_iter().map(u128::from).product::<u128>();
-    if positions <= SPARSE * (grid.chunks().count() as u128 + 1) {
-        return ray.walk(drawn, cells).find_map(hit);
+    let limits = grid.limits();
+    if ray.steps(limits, cells) <= NEAR {
+        return ray.walk(limits, cells).find_map(hit);
+    }
+    let drawn = grid.chunks().map(|(position, _)| drawn_by(grid, position));
+    let all = drawn.reduce(|all, region| all.union(&region))?;
+    if ray.steps(all, cells) <= NEAR + grid.chunks().count() as f64 {
+        return ray.walk(all, cells).find_map(hit);
     }
     // Few chunks far apart: those that the ray enters, in the order in which it does.
-    let around = |position| Region::new(position, position).grown(1, 1).intersection(&drawn).points();
-    let candidates: BTreeSet<_> = grid.chunks().flat_map(|(position, _)| around(position)).collect();
+    let candidates: BTreeSet<_> = grid.chunks().flat_map(|(position, _)| drawn_by(grid, position).points()).collect();
     let enters = |chunk: [i32; 3]| Some((ray.span(Region::new(chunk, chunk).grown(0, 1), cells)?.0, chunk));
     let mut entered: Vec<_> = candidates.into_iter().filter_map(enters).collect();
     entered.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     entered.into_iter().find_map(|(_, chunk)| hit(chunk))
 }
 
-/// Where there are more chunk positions than this for every chunk, it is not worth walking through all of them.
-const SPARSE: u128 = 27;
+/// A ray that passes no more chunk positions than this is walked without a look at which of them have chunks.
+const NEAR: f64 = 64.0;
 
 /// The weight at any position, in voxels: trilinear between the eight lattice points around it; finite, infinite and
 /// NaN samples count as the farthest finite ones of their side. `None` where the position is not finite.
@@ -113,13 +116,9 @@ pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
     Some(weight.sum::<f64>() as f32)
 }
 
-/// A box around the chunk positions that have a mesh.
-fn drawn_chunks<W: Weight>(grid: &Grid<W>) -> Region {
-    grid.bounds().unwrap_or_else(|| {
-        let regions = grid.chunks().map(|(position, _)| grid.chunk_region(position));
-        let present = regions.reduce(|all, region| all.union(&region)).unwrap_or(Region::new([0; 3], [0; 3]));
-        grid.chunks_affected_by(present)
-    })
+/// The chunk positions whose meshes read a chunk's samples for more than normals.
+fn drawn_by<W: Weight>(grid: &Grid<W>, position: [i32; 3]) -> Region {
+    Region::new(position, position).grown(1, 1).intersection(&grid.limits())
 }
 
 /// The triangles of one chunk.

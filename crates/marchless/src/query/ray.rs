@@ -48,6 +48,13 @@ impl Ray {
         (plane - self.origin[axis]) / self.direction[axis]
     }
 
+    /// No fewer than [`walk`](Self::walk) goes through.
+    pub(super) fn steps(&self, region: Region, size: i64) -> f64 {
+        let length = self.span(region, size).map(|(start, end)| (end - start) / size as f64);
+        // One more than planes are passed, of which each axis may have one more than the length has sizes.
+        length.map_or(0.0, |length| self.direction.iter().map(|along| along.abs() * length).sum::<f64>() + 4.0)
+    }
+
     /// The cells of `region` that the ray passes, in order.
     pub(super) fn walk(&self, region: Region, size: i64) -> impl Iterator<Item = [i32; 3]> {
         let span = self.span(region, size);

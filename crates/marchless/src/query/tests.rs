@@ -167,6 +167,17 @@ proptest! {
     }
 
     #[test]
+    fn no_walk_is_longer_than_was_said(
+        origin in prop::array::uniform3(-300.0f64..300.0), direction in direction(), length in 0.0f64..500.0,
+    ) {
+        if let Some(ray) = Ray::new(origin, direction, length) {
+            let region = Region::new([-4, -30, -5], [20, 30, 7]);
+            let (steps, walked) = (ray.steps(region, 8), ray.walk(region, 8).count());
+            prop_assert!(walked as f64 <= steps && steps <= 2.0 * walked as f64 + 5.0, "{walked}, not {steps}");
+        }
+    }
+
+    #[test]
     fn no_ray_does_harm(
         seed: u64,
         bounded: bool,
