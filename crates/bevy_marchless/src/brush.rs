@@ -11,7 +11,7 @@ use bevy_math::{DVec3, IVec3, Vec3};
 use bevy_reflect::prelude::*;
 use marchless::BrushError;
 
-pub(crate) use apply::apply_waiting_stamps;
+pub(crate) use apply::{StampQueue, apply_waiting_stamps};
 
 use crate::schedule::MarchlessSystems;
 use crate::stats::count_update;
@@ -212,7 +212,7 @@ impl Plugin for BrushPlugin {
             .add_message::<TerrainEdited>()
             .register_type::<Stamp>()
             .register_type::<TerrainEdited>()
-            .init_resource::<apply::StampQueue>()
+            .init_resource::<StampQueue>()
             .add_systems(PostUpdate, apply::read_stamps.after(count_update).in_set(MarchlessSystems::ReadStamps))
             .add_systems(PostUpdate, (apply::apply_stamps, apply::report_edits).chain().in_set(MarchlessSystems::Edit));
     }

@@ -138,10 +138,11 @@ fn mesh_terrains(
     for (terrain, mut volume) in &mut volumes {
         if !volume.ready.is_empty() || !volume.streaming.to_mesh.is_empty() || !volume.pending.is_empty() {
             let mut start = Start { terrain, queue: &queue, results: &results, screen: &mut screen, inline: 0 };
-            start.ready_chunks(&mut volume, until);
-            start.first_meshes(&mut volume, &settings, until);
             start.inline = settings.inline_chunks;
             start.pending_chunks(&mut volume);
+            start.inline = 0;
+            start.ready_chunks(&mut volume, until);
+            start.first_meshes(&mut volume, &settings, until);
         }
     }
     main_thread.stop(start);
@@ -197,7 +198,7 @@ impl Start<'_, '_, '_> {
                 volume.streaming.add_to_mesh(key);
             }
             done += 1;
-            if done % 16 == 0 && Instant::now() >= until {
+            if done % 4 == 0 && Instant::now() >= until {
                 break;
             }
         }
@@ -223,7 +224,7 @@ impl Start<'_, '_, '_> {
             let pending = Pending { chunks: BTreeSet::from([key]), since: None };
             self.group(volume, pending, Priority::FirstMesh(urgency));
             done += 1;
-            if done % 16 == 0 && Instant::now() >= until {
+            if done % 2 == 0 && Instant::now() >= until {
                 break;
             }
         }

@@ -61,7 +61,7 @@ pub struct MarchlessSettings {
     /// edits are shown at once whatever their size. Default 4 MiB.
     pub upload_bytes: usize,
     /// How long the main thread may load and unload chunks per update; what is left waits. Each update does some. Default:
-    /// four tenths of a millisecond.
+    /// six tenths of a millisecond.
     pub main_thread: Duration,
     /// Without threads: how many chunks may be sampled or meshed per update, on the main thread; `Some(0)` lets them all
     /// wait, and only what `inline_chunks` allows is meshed. `None`: in tasks,
@@ -75,7 +75,7 @@ impl Default for MarchlessSettings {
             inline_chunks: 8,
             chunks_in_flight: 64,
             upload_bytes: 4 << 20,
-            main_thread: Duration::from_micros(400),
+            main_thread: Duration::from_micros(600),
             budget: cfg!(target_arch = "wasm32").then_some(8),
         }
     }

@@ -25,6 +25,7 @@ fn what_a_viewer_sees_is_loaded_and_goes_when_it_leaves() {
     settle(&mut app, terrain);
     assert!(geometry(&mut app, terrain) == here, "as before");
     assert_eq!(volume(&app, terrain).coverage(), first);
+    app.update(); // Assets that nobody holds any more go an update later.
     assert_eq!(app.world_mut().query::<&bevy_mesh::Mesh3d>().iter(app.world()).count(), mesh_assets(&app));
     app.world_mut().despawn(viewer);
     settle(&mut app, terrain);

@@ -211,17 +211,23 @@ impl<W: Weight> Grid<W> {
 
     /// The chunk at `position` with its neighbours, as they are now: what a task needs to mesh it.
     pub fn neighbourhood(&self, position: [i32; 3]) -> Neighbourhood<W> {
-        let chunks = core::array::from_fn(|index| {
-            let step = [index % 3, index / 3 % 3, index / 9];
-            let mut neighbour = [0; 3];
-            for axis in 0..3 {
-                neighbour[axis] = position[axis].checked_add(step[axis] as i32 - 1)?;
-            }
-            match self.chunks.get(&neighbour) {
-                Some(chunk) => Some(chunk.clone()),
-                None => self.limits().contains(neighbour).then_some(Chunk::AIR),
-            }
+        let limits = self.limits();
+        let step = |index: usize| [index % 3, index / 3 % 3, index / 9];
+        let mut chunks = core::array::from_fn(|index| {
+            let neighbour = [0, 1, 2].map(|axis| i64::from(position[axis]) + step(index)[axis] as i64 - 1);
+            let is_within = |axis: usize| (limits.min[axis].into()..limits.max[axis].into()).contains(&neighbour[axis]);
+            (0..3).all(is_within).then_some(Chunk::AIR)
         });
+        // Three at a time, since those above each other along z follow each other in the map.
+        let around = position.map(|v| [v.saturating_sub(1), v, v.saturating_add(1)]);
+        for (j, y) in around[1].into_iter().enumerate() {
+            for (i, x) in around[0].into_iter().enumerate() {
+                for (&neighbour, chunk) in self.chunks.range([x, y, around[2][0]]..=[x, y, around[2][2]]) {
+                    let k = (neighbour[2] - around[2][0]) as usize;
+                    chunks[i + 3 * (j + 3 * k)] = Some(chunk.clone());
+                }
+            }
+        }
         let origin = position.map(|v| i64::from(v) * i64::from(self.cells));
         Neighbourhood { chunks, cells: self.cells, origin, border: self.border() }
     }

@@ -16,6 +16,12 @@ use crate::terrain::{Signs, TerrainVolume};
 #[derive(Resource, Default)]
 pub(crate) struct StampQueue(Vec<Queued>);
 
+impl StampQueue {
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
 struct Queued {
     terrain: Entity,
     stamp: marchless::Stamp,

@@ -86,11 +86,20 @@ pub(crate) fn mesh_now(mut jobs: Vec<MeshJob>) -> Vec<Meshed> {
     }
 }
 
+/// The indices, in half the bytes where there are few enough vertices.
+fn indices(geometry: &MeshBuffer) -> Indices {
+    if geometry.positions.len() <= usize::from(u16::MAX) {
+        Indices::U16(geometry.indices.iter().map(|&index| index as u16).collect())
+    } else {
+        Indices::U32(geometry.indices.clone())
+    }
+}
+
 /// A mesh for the render world: positions in voxels, colours and materials a vertex.
 fn to_asset(geometry: &MeshBuffer, colors: &Colors) -> Mesh {
     let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, geometry.positions.clone())
-        .with_inserted_indices(Indices::U32(geometry.indices.clone()));
+        .with_inserted_indices(indices(geometry));
     if !geometry.normals.is_empty() {
         mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, geometry.normals.clone());
     }

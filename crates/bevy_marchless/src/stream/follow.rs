@@ -16,7 +16,7 @@ use super::agenda::Agenda;
 use super::look::Look;
 use super::range::{Range, Ranges, Viewed, Wanted};
 use super::{StreamStats, TerrainViewer};
-use crate::brush::apply_waiting_stamps;
+use crate::brush::{StampQueue, apply_waiting_stamps};
 use crate::chunk::ChunkKey;
 use crate::place::{Place, in_double_precision};
 use crate::schedule::MarchlessSettings;
@@ -28,8 +28,8 @@ use crate::work::{Ticket, WorkQueue};
 const BOX: i32 = 4;
 /// Bounds of so many boxes are remembered.
 const MOST_BOXES: usize = 4096;
-/// Each update at least so many chunks are gone through.
-const LEAST: usize = 16;
+/// Each update at least so many chunks come, and as many go.
+const LEAST: usize = 4;
 /// So many stamps may wait for a chunk that is not loaded, before it is filled for their sake.
 const MOST_STAMPS: usize = 64;
 
@@ -160,6 +160,7 @@ pub(crate) fn follow_viewers(
     viewers: Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>,
     transforms: TransformHelper,
     settings: Res<MarchlessSettings>,
+    stamps: Option<Res<StampQueue>>,
     mut stats: ResMut<StreamStats>,
     mut main_thread: ResMut<MainThread>,
     mut commands: Commands,
@@ -211,7 +212,9 @@ pub(crate) fn follow_viewers(
             volume.streaming.leaving.extend(all);
         }
         if !volume.streaming.arriving.is_empty() || !volume.streaming.leaving.is_empty() {
-            let until = main_thread.until(start, settings.main_thread / 2);
+            // Half of the time is for what follows; new edits take theirs first.
+            let edits = stamps.as_ref().is_some_and(|it| !it.is_empty()) && !volume.streaming.holds_stamps;
+            let until = main_thread.until(start, settings.main_thread / if edits { 8 } else { 2 });
             let mut follow = Follow { volume: &mut volume, commands: &mut commands, stats: &mut stats, despawned: 0 };
             follow.go_on(until);
         }
@@ -243,16 +246,17 @@ impl Follow<'_, '_, '_> {
             isovalue: terrain.isovalue,
         };
         // At least as many may go as come, so that there are never more than the ranges hold and what is on its way out.
-        let half = Instant::now() + until.saturating_duration_since(Instant::now()) / 2;
+        let share = if self.volume.streaming.arriving.is_empty() { 1 } else { 2 };
+        let until_gone = Instant::now() + until.saturating_duration_since(Instant::now()) / share;
         let mut done = 0;
-        while (done < 2 * LEAST || done % 8 != 0 || Instant::now() + self.despawned * ENTITY_TIME < half)
+        while (done < LEAST || Instant::now() + self.despawned * ENTITY_TIME < until_gone)
             && let Some(key) = self.volume.streaming.leaving.pop()
         {
             self.settle(key, &asked);
             done += 1;
         }
         let mut done = 0;
-        while (done < LEAST || done % 8 != 0 || Instant::now() + self.despawned * ENTITY_TIME < until)
+        while (done < LEAST || Instant::now() + self.despawned * ENTITY_TIME < until)
             && let Some(key) = self.volume.streaming.next_arriving()
         {
             self.settle(key, &asked);
@@ -297,8 +301,9 @@ impl Follow<'_, '_, '_> {
     /// Loads neighbours of a chunk that stays for the margin's sake alone, where they went before the ranges came back:
     /// nobody else would, and edits of the chunk would wait for them for ever.
     fn load_lost_neighbours(&mut self, key: ChunkKey, asked: &Asked) {
-        if self.volume.chunks.get(&key).is_none_or(|state| state.missing == 0) {
-            return;
+        let lacks_some = self.volume.chunks.get(&key).is_some_and(|state| state.missing > 0);
+        if !lacks_some || self.volume.streaming.ranges.contains(key.position) {
+            return; // What a chunk in range lacks comes anyway.
         }
         for near in key.around().filter(|near| asked.extent.contains(near.position)) {
             let wanted = self.volume.streaming.ranges.wanted(near.position, Wanted::Samples);

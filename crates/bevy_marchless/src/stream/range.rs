@@ -125,12 +125,17 @@ impl Grown {
     /// The positions along an axis of chunks that come as near as `radius` to the middle.
     fn reach(&self, axis: usize, radius: f64) -> ops::Range<i32> {
         let (middle, extent) = (self.range.middle[axis], &self.range.extent);
-        // Conversions saturate.
-        let from = (middle - radius - 1.0 - self.by).ceil() as i32;
-        let to = ((middle + radius + self.by).floor() as i32).saturating_add(1);
+        let from = floor(-(middle - radius - 1.0 - self.by)).saturating_neg();
+        let to = floor(middle + radius + self.by).saturating_add(1);
         let (from, to) = (from.max(extent.min[axis]), to.min(extent.max[axis]));
         from..to.max(from)
     }
+}
+
+/// The greatest integer that is not greater, saturating. Without SSE4.1 [`f64::floor`] is a call, and ranges have many rows.
+fn floor(value: f64) -> i32 {
+    let towards_zero = value as i32;
+    towards_zero.saturating_sub((f64::from(towards_zero) > value).into())
 }
 
 /// The ranges of a terrain, as the viewers' and what is kept ask for them.
@@ -247,7 +252,7 @@ impl Ranges {
     pub(crate) fn differ_in_urgency(&self, old: &Self) -> bool {
         let far = |(new, old): (&Viewed, &Viewed)| {
             let [new_middle, old_middle] = [new, old].map(|viewed| viewed.range.middle);
-            new.forward != old.forward || (0..3).any(|axis| (new_middle[axis] - old_middle[axis]).abs() >= 0.5)
+            new.forward != old.forward || (0..3).any(|axis| (new_middle[axis] - old_middle[axis]).abs() >= 1.0)
         };
         self.0.len() != old.0.len() || self.0.iter().zip(&old.0).any(far)
     }

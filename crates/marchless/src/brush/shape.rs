@@ -1,7 +1,7 @@
 //! [`BrushShape`]: quantised shapes and their signed distances, in integers.
 
 use super::BrushError;
-use crate::lattice::Region;
+use crate::{lattice::Region, math::sqrt_f64};
 
 /// Units per voxel: shapes are quantised to 1/256 voxel, the step of an `i16` weight.
 pub(super) const UNITS: u32 = 256;
@@ -178,6 +178,12 @@ fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// ⌊√`square`⌋. Correctly rounded roots of less than 2⁵² are exact enough for that, and far quicker than integers'.
+#[inline]
+fn root(square: u64) -> i64 {
+    if square < 1 << 52 { sqrt_f64(square as f64) as i64 } else { square.isqrt() as i64 }
+}
+
 /// Distances clamped to `low..=high`, with square roots only in between.
 #[derive(Clone, Copy)]
 struct Clamp {
@@ -198,7 +204,16 @@ impl Clamp {
             return self.high;
         }
         let square: u64 = offset.iter().map(|v| v.unsigned_abs().pow(2)).sum();
-        self.root(square.into(), 1, radius)
+        let radius = i64::from(radius);
+        let limit = |distance: i64| distance.unsigned_abs().pow(2);
+        let (low, high) = (radius + self.low, radius + self.high);
+        if square >= limit(high) {
+            self.high
+        } else if low >= 0 && square <= limit(low) {
+            self.low
+        } else {
+            (root(square) - radius).max(self.low)
+        }
     }
 
     /// The distance to a box, `beyond` whose faces the point lies by so much on each axis.
@@ -224,12 +239,12 @@ impl Clamp {
         // The distance to the line is |from_a × along| / |along|.
         let cross = |i: usize, j: usize| (from_a[i] * along[j] - from_a[j] * along[i]).unsigned_abs();
         let square = [cross(1, 2), cross(2, 0), cross(0, 1)].map(|v| u128::from(v).pow(2)).iter().sum();
-        self.root(square, dot(along, along) as u64, radius)
+        self.root_of_quotient(square, dot(along, along) as u64, radius)
     }
 
     /// ⌊√(`square` / `divisor`)⌋ − `radius`, clamped.
     #[inline]
-    fn root(self, square: u128, divisor: u64, radius: u32) -> i64 {
+    fn root_of_quotient(self, square: u128, divisor: u64, radius: u32) -> i64 {
         let radius = i64::from(radius);
         let limit = |distance: i64| (distance as u128).pow(2) * u128::from(divisor);
         let (low, high) = (radius + self.low, radius + self.high);
@@ -238,7 +253,24 @@ impl Clamp {
         } else if low >= 0 && square <= limit(low) {
             self.low
         } else {
-            (((square / u128::from(divisor)) as u64).isqrt() as i64 - radius).max(self.low)
+            (root((square / u128::from(divisor)) as u64) - radius).max(self.low)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::root;
+
+    proptest! {
+        #[test]
+        fn roots_are_those_of_integers(square: u64, shift in 0u32..64, side in 0u64..1 << 31, step in 0u64..3) {
+            let near_a_square = (side * side).saturating_add(step).saturating_sub(1);
+            for square in [square >> shift, near_a_square, (1 << 52) - 1, 1 << 52] {
+                prop_assert_eq!(root(square), square.isqrt() as i64, "{}", square);
+            }
         }
     }
 }
