@@ -245,8 +245,10 @@ impl Follow<'_, '_, '_> {
             spacing: f64::from(terrain.voxel_size),
             isovalue: terrain.isovalue,
         };
-        // At least as many may go as come, so that there are never more than the ranges hold and what is on its way out.
-        let share = if self.volume.streaming.arriving.is_empty() { 1 } else { 2 };
+        // Both have half of the time, unless as many are on their way out as the ranges hold: then hardly any come.
+        let Streaming { ranges, arriving, leaving, .. } = &self.volume.streaming;
+        let is_crowded = leaving.len() as f64 > ranges.0.iter().map(|viewed| viewed.range.box_size()).sum();
+        let share = if arriving.is_empty() || is_crowded { 1 } else { 2 };
         let until_gone = Instant::now() + until.saturating_duration_since(Instant::now()) / share;
         let mut done = 0;
         while (done < LEAST || Instant::now() + self.despawned * ENTITY_TIME < until_gone)
@@ -256,7 +258,7 @@ impl Follow<'_, '_, '_> {
             done += 1;
         }
         let mut done = 0;
-        while (done < LEAST || Instant::now() + self.despawned * ENTITY_TIME < until)
+        while (done < LEAST || !is_crowded && Instant::now() + self.despawned * ENTITY_TIME < until)
             && let Some(key) = self.volume.streaming.next_arriving()
         {
             self.settle(key, &asked);
