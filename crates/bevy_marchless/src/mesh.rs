@@ -203,7 +203,7 @@ impl Start<'_, '_, '_> {
             }
         }
         volume.ready.append(&mut later);
-        self.group(volume, Pending { chunks: no_longer_drawn, since: None }, Priority::Edit);
+        self.group(volume, Pending { chunks: no_longer_drawn, ..Pending::default() }, Priority::Edit);
     }
 
     /// Starts the most urgent chunks that are to be meshed for the first time, one by one, as many as may be in flight.
@@ -221,7 +221,7 @@ impl Start<'_, '_, '_> {
                 continue;
             }
             let urgency = volume.streaming.ranges().urgency(key.position);
-            let pending = Pending { chunks: BTreeSet::from([key]), since: None };
+            let pending = Pending { chunks: BTreeSet::from([key]), ..Pending::default() };
             self.group(volume, pending, Priority::FirstMesh(urgency));
             done += 1;
             if done % 2 == 0 && Instant::now() >= until {
@@ -242,7 +242,8 @@ impl Start<'_, '_, '_> {
     }
 
     /// Starts a group: shows it at once, where that is quick, or asks for its meshes.
-    fn group(&mut self, volume: &mut TerrainVolume, Pending { chunks, since }: Pending, priority: Priority) {
+    fn group(&mut self, volume: &mut TerrainVolume, pending: Pending, priority: Priority) {
+        let Pending { chunks, look_the_same, since } = pending;
         let Some(terrain) = &volume.settings else { return };
         let (settings, colors) = (terrain.mesh_settings(), volume.colors.clone());
         let mut group = Group {
@@ -267,16 +268,14 @@ impl Start<'_, '_, '_> {
             }
         }
         if waits {
-            volume.pending.push(Pending { chunks: group.chunks, since });
+            volume.pending.push(Pending { chunks: group.chunks, look_the_same, since });
             return;
         }
         let mut jobs = Vec::new();
         for key in &group.chunks {
-            let is_member = |state: &ChunkState| state.wanted == Wanted::Mesh && !state.hidden && state.missing == 0;
-            if !volume.chunks.get(key).is_some_and(is_member) {
-                continue;
-            }
-            group.members += 1;
+            let is_member = |state: &&ChunkState| state.wanted == Wanted::Mesh && !state.hidden && state.missing == 0;
+            let Some(state) = volume.chunks.get(key).filter(is_member) else { continue };
+            let stays = state.drawn && !state.stale && look_the_same.contains(key);
             for neighbour in key.around() {
                 let is_shown_as_it_is = |chunk| {
                     let is_drawn = volume.chunks.get(&neighbour).is_some_and(|state| state.drawn);
@@ -287,6 +286,10 @@ impl Start<'_, '_, '_> {
                     group.snapshot.entry(neighbour.position).or_insert_with(|| chunk.clone());
                 }
             }
+            if stays {
+                continue;
+            }
+            group.members += 1;
             let samples = volume.grid.neighbourhood(key.position);
             if samples.is_uniform() {
                 group.meshed.push(Meshed::empty(key.position));
@@ -295,7 +298,7 @@ impl Start<'_, '_, '_> {
                 jobs.push(MeshJob { position: key.position, samples, settings, colors });
             }
         }
-        if group.members == 0 {
+        if group.members == 0 && group.snapshot.is_empty() {
             return;
         }
         if jobs.len() <= self.inline {

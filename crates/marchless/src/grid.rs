@@ -3,6 +3,7 @@
 mod block;
 pub(crate) mod border;
 mod chunk;
+mod redrawn;
 #[cfg(test)]
 mod tests;
 

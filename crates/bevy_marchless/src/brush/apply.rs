@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use marchless::Region;
+use marchless::{Chunk, Region};
 
 use super::{Stamp, TerrainEdited};
 use crate::chunk::ChunkKey;
 use crate::stats::{MainThread, Since, Stats};
 use crate::stream::free_samples_for;
-use crate::terrain::{Signs, TerrainVolume};
+use crate::terrain::{Pending, Signs, Terrain, TerrainVolume};
 
 /// Stamps that have been read but not applied, in order.
 #[derive(Resource, Default)]
@@ -50,7 +50,7 @@ pub(crate) fn apply_stamps(
         return;
     }
     let start = main_thread.start();
-    let mut edited = BTreeMap::<Entity, Since>::new();
+    let mut edited = BTreeMap::<Entity, Applied>::new();
     let mut waiting = BTreeMap::<Entity, bool>::new();
     queue.0.retain(|Queued { terrain, stamp, since }| {
         let terrain = *terrain;
@@ -59,8 +59,8 @@ pub(crate) fn apply_stamps(
                 let waits = waiting.entry(terrain).or_default();
                 *waits = *waits || !free_samples_for(&mut volume, stamp.region());
                 if !*waits {
-                    apply_stamp(&mut volume, *stamp);
-                    edited.entry(terrain).or_insert(*since);
+                    let applied = edited.entry(terrain).or_insert_with(|| Applied::new(*since));
+                    apply_stamp(&mut volume, *stamp, applied);
                 }
                 return *waits;
             }
@@ -74,17 +74,45 @@ pub(crate) fn apply_stamps(
             volume.streaming.holds_stamps = waits;
         }
     }
-    for (terrain, since) in edited {
+    for (terrain, applied) in edited {
         if let Ok(mut volume) = volumes.get_mut(terrain) {
-            let dirty = volume.grid.take_dirty();
-            volume.add_changed(dirty, Some(since));
+            applied.note(&mut volume);
         }
     }
     main_thread.stop(start);
 }
 
+/// What an update's stamps have done to a terrain's chunks.
+struct Applied {
+    /// Of the first of them.
+    since: Since,
+    /// The chunks with changed samples, as they were.
+    before: BTreeMap<[i32; 3], Chunk<i16>>,
+    /// A box around the changed samples.
+    changed: Region,
+}
+
+impl Applied {
+    const fn new(since: Since) -> Self {
+        Self { since, before: BTreeMap::new(), changed: Region::new([0; 3], [0; 3]) }
+    }
+
+    /// Notes which chunks are to be shown anew, and which of them to be meshed.
+    fn note(self, volume: &mut TerrainVolume) {
+        let chunks = volume.grid.take_dirty();
+        let settings = volume.settings().map(Terrain::mesh_settings).unwrap_or_default();
+        let redrawn = volume.grid.chunks_redrawn(&self.before, self.changed, &settings);
+        let look_the_same = redrawn.map(|redrawn| chunks.difference(&redrawn).copied().map(ChunkKey::finest).collect());
+        volume.add_pending(Pending {
+            chunks: chunks.into_iter().map(ChunkKey::finest).collect(),
+            look_the_same: look_the_same.unwrap_or_default(),
+            since: Some(self.since),
+        });
+    }
+}
+
 /// Applies a stamp to the chunks that have their samples, and keeps it for the others, loaded or not.
-fn apply_stamp(volume: &mut TerrainVolume, stamp: marchless::Stamp) {
+fn apply_stamp(volume: &mut TerrainVolume, stamp: marchless::Stamp, applied: &mut Applied) {
     let touched = stamp.region();
     let Some(bounds) = volume.grid.bounds().filter(|_| !touched.is_empty()) else { return };
     let (low, high) = (volume.grid.chunk_of(touched.min), volume.grid.chunk_of(touched.max.map(|v| v - 1)));
@@ -95,7 +123,14 @@ fn apply_stamp(volume: &mut TerrainVolume, stamp: marchless::Stamp) {
             None => volume.grid.chunk(position).is_some(),
         };
         if has_samples {
-            change(volume, position, &stamp);
+            // A clone lives for the first change only: while it does, the samples are copied to be changed.
+            let is_first = !applied.before.contains_key(&position);
+            let before = is_first.then(|| volume.grid.chunk(position).cloned().unwrap_or(Chunk::AIR));
+            let changed = change(volume, position, &stamp);
+            if !changed.is_empty() {
+                applied.before.extend(before.map(|before| (position, before)));
+                applied.changed = applied.changed.union(&changed);
+            }
         } else {
             volume.stamps.entry(position).or_default().push(stamp.clone());
         }
@@ -109,8 +144,8 @@ pub(crate) fn apply_waiting_stamps(volume: &mut TerrainVolume, position: [i32; 3
     }
 }
 
-/// Applies a stamp to a chunk's samples.
-fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Stamp) {
+/// Applies a stamp to a chunk's samples, and returns a box around those that changed.
+fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Stamp) -> Region {
     let edit = volume.grid.apply_to_chunk(position, stamp);
     if !edit.is_empty() {
         volume.edited.insert(position);
@@ -119,6 +154,7 @@ fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Sta
         }
     }
     volume.edit.merge(&edit);
+    edit.region
 }
 
 /// Tells what the update has changed of each terrain.

@@ -113,11 +113,24 @@ pub(crate) enum Fill {
 }
 
 /// Changed chunks that are to be meshed from one snapshot.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Pending {
     pub(crate) chunks: BTreeSet<ChunkKey>,
+    /// Those of them whose meshes, where they have been drawn, stay as they are.
+    pub(crate) look_the_same: BTreeSet<ChunkKey>,
     /// When the first of the edits was asked for; `None` where none was (a change of settings).
     pub(crate) since: Option<Since>,
+}
+
+impl Pending {
+    /// Takes in all of another set. What looks the same after one change may not after the other.
+    fn merge(&mut self, other: &mut Self) {
+        self.look_the_same.retain(|key| !other.chunks.contains(key) || other.look_the_same.contains(key));
+        other.look_the_same.retain(|key| !self.chunks.contains(key) || self.look_the_same.contains(key));
+        self.look_the_same.append(&mut other.look_the_same);
+        self.chunks.append(&mut other.chunks);
+        self.since = Since::earlier(self.since, other.since);
+    }
 }
 
 /// Chunks that are being meshed from one snapshot, to be shown in one update.
@@ -280,24 +293,24 @@ impl TerrainVolume {
     }
 
     /// Notes that chunks have changed; sets that overlap become one.
-    pub(crate) fn add_pending(&mut self, mut chunks: BTreeSet<ChunkKey>, mut since: Option<Since>) {
-        if chunks.is_empty() {
+    pub(crate) fn add_pending(&mut self, mut new: Pending) {
+        if new.chunks.is_empty() {
             return;
         }
         self.pending.retain_mut(|other| {
-            let overlaps = !chunks.is_disjoint(&other.chunks);
+            let overlaps = !new.chunks.is_disjoint(&other.chunks);
             if overlaps {
-                chunks.append(&mut other.chunks);
-                since = Since::earlier(since, other.since);
+                new.merge(other);
             }
             !overlaps
         });
-        self.pending.push(Pending { chunks, since });
+        self.pending.push(new);
     }
 
     /// Notes that chunks of the finest level have changed. Those that are not to be drawn may be by the time the others are.
     pub(crate) fn add_changed(&mut self, changed: BTreeSet<[i32; 3]>, since: Option<Since>) {
-        self.add_pending(changed.into_iter().map(ChunkKey::finest).collect(), since);
+        let chunks = changed.into_iter().map(ChunkKey::finest).collect();
+        self.add_pending(Pending { chunks, since, ..Pending::default() });
     }
 
     /// Notes that a chunk has its samples, and finds which chunks can now be meshed.
@@ -486,13 +499,15 @@ mod tests {
     fn sets_that_overlap_become_one() {
         let mut volume = TerrainVolume::default();
         let set = |xs: &[i32]| xs.iter().map(|&x| ChunkKey::finest([x, 0, 0])).collect::<BTreeSet<_>>();
-        volume.add_pending(set(&[0, 1]), None);
-        volume.add_pending(set(&[4, 5]), None);
+        let pending = |xs: &[i32], same: &[i32]| Pending { chunks: set(xs), look_the_same: set(same), since: None };
+        volume.add_pending(pending(&[0, 1], &[0, 1]));
+        volume.add_pending(pending(&[4, 5], &[4]));
         assert_eq!(volume.pending.len(), 2);
-        volume.add_pending(set(&[1, 2, 4]), None);
+        volume.add_pending(pending(&[1, 2, 4, 6], &[4, 6]));
         let [only] = &volume.pending[..] else { panic!("one set: {:?}", volume.pending) };
-        assert_eq!(only.chunks, set(&[0, 1, 2, 4, 5]));
-        volume.add_pending(set(&[]), None);
+        assert_eq!(only.chunks, set(&[0, 1, 2, 4, 5, 6]));
+        assert_eq!(only.look_the_same, set(&[0, 4, 6]), "1 changes with the later set, 5 with the earlier");
+        volume.add_pending(pending(&[], &[]));
         assert_eq!(volume.pending.len(), 1);
     }
 }

@@ -1,0 +1,346 @@
+//! Which chunks' meshes a change leaves as they are, although they read changed samples.
+//!
+//! A vertex lies on an edge whose ends have different signs, and depends on the samples at both ends and their neighbours
+//! along the axes; signs alone decide on triangles, but for the [trilinear topology](Topology::Trilinear), which looks at
+//! the corners of cells. So a changed sample shows only near the surface, as it is or as it was. Signs are words here, a
+//! bit for each sample of a row, and all samples of a row are looked at in one go.
+
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use super::{Chunk, Grid};
+use crate::bits::BitGrid;
+use crate::lattice::{Region, Samples, Shape};
+use crate::mesher::{MeshSettings, Topology};
+use crate::sample::Weight;
+
+/// Samples read around the changed ones, either way: the neighbours of their neighbours.
+const REACH: u32 = 2;
+
+impl<W: Weight> Grid<W> {
+    /// Of the [chunks affected by](Self::chunks_affected_by) a change, those whose meshes may have become others: in the
+    /// rest, all that has changed is too far from the surface, as it is and as it was, to show.
+    ///
+    /// `changed`: a box around the changed samples. `before`: every chunk that holds some of them, as it was
+    /// ([`Chunk::AIR`], where it was absent). `settings`: of the meshes.
+    ///
+    /// `None` where that is not looked into: for boxes of more than 60 points along an axis, isovalues that are not
+    /// finite, and isovalues above zero at the border of a bounded grid.
+    pub fn chunks_redrawn(
+        &self,
+        before: &BTreeMap<[i32; 3], Chunk<W>>,
+        changed: Region,
+        settings: &MeshSettings,
+    ) -> Option<BTreeSet<[i32; 3]>> {
+        if changed.is_empty() {
+            return Some(BTreeSet::new());
+        }
+        let read = changed.grown(REACH, REACH);
+        let fits = (0..3).all(|axis| changed.size()[axis] + 2 * REACH == read.size()[axis] && read.size()[axis] <= 64);
+        let raised = self.border().and_then(|border| border.raised(settings.isovalue));
+        if !fits || raised.is_some_and(|border| border.reaches(&read)) {
+            return None;
+        }
+        let shape = Shape::new(read.size()).ok()?;
+        let weights = self.weights(read, shape);
+        let signs = BitGrid::from_samples(Samples::new(shape, &weights).ok()?, settings.isovalue).ok()?;
+        let now = signs.words();
+        let mut rows = Rows { read, now, before: now.to_vec(), changed: vec![0; now.len()] };
+        let threshold = W::threshold(settings.isovalue);
+        let air = Chunk::AIR;
+        for (position, old) in before {
+            let new = self.chunk(*position).unwrap_or(&air);
+            rows.compare(old, new, self.chunk_region(*position), changed, threshold);
+        }
+        let shows = rows.shows(changed, settings.topology);
+        let is_redrawn = |position: &[i32; 3]| {
+            let meshed = self.chunk_region(*position).grown(0, 1).intersection(&changed.grown(1, 1));
+            rows.rows_of(meshed).any(|(row, _, mask)| shows[row] & mask != 0)
+        };
+        Some(self.chunks_affected_by(changed).points().filter(is_redrawn).collect())
+    }
+
+    /// The weights of a box, x fastest.
+    fn weights(&self, region: Region, shape: Shape) -> Vec<W> {
+        let mut weights = vec![W::OUTSIDE; shape.len()];
+        let [_, along_y, along_z] = shape.strides();
+        let (first, last) = (self.chunk_of(region.min), self.chunk_of(region.max.map(|v| v - 1)));
+        for position in Region::new(first, last).grown(0, 1).points() {
+            let part = self.chunk_region(position).intersection(&region);
+            let chunk = self.chunk(position);
+            for z in part.min[2]..part.max[2] {
+                for y in part.min[1]..part.max[1] {
+                    let [dx, dy, dz] = [part.min[0] - region.min[0], y - region.min[1], z - region.min[2]];
+                    let start = dx as usize + along_y * dy as usize + along_z * dz as usize;
+                    let row = &mut weights[start..start + part.size()[0] as usize];
+                    match chunk {
+                        Some(Chunk::Samples(samples)) => {
+                            let from = self.index([part.min[0], y, z]);
+                            row.copy_from_slice(&samples.weights[from..from + row.len()]);
+                        }
+                        Some(Chunk::Uniform(voxel)) => row.fill(voxel.weight),
+                        None => {
+                            for (weight, x) in row.iter_mut().zip(part.min[0]..) {
+                                *weight = self.get([x, y, z]).weight;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        weights
+    }
+}
+
+/// Samples of a box, one word a row.
+struct Rows<'a> {
+    read: Region,
+    /// Which samples are inside,
+    now: &'a [u64],
+    /// and which were.
+    before: Vec<u64>,
+    changed: Vec<u64>,
+}
+
+impl Rows<'_> {
+    /// Notes what has changed in one chunk, whose points are `chunk`, within a box.
+    fn compare<W: Weight>(
+        &mut self,
+        old: &Chunk<W>,
+        new: &Chunk<W>,
+        chunk: Region,
+        within: Region,
+        threshold: W::Threshold,
+    ) {
+        let [nx, ny, _] = chunk.size().map(|size| size as usize);
+        let part = chunk.intersection(&within);
+        if part.is_empty() {
+            return;
+        }
+        let (mut old_room, mut new_room) = (([W::OUTSIDE; 64], [0; 64]), ([W::OUTSIDE; 64], [0; 64]));
+        let (len, first_bit) = (part.size()[0] as usize, part.min[0] - self.read.min[0]);
+        for (row, [y, z], _) in self.rows_of(part) {
+            let [dx, dy, dz] = [part.min[0] - chunk.min[0], y - chunk.min[1], z - chunk.min[2]].map(|v| v as usize);
+            let from = dx + nx * (dy + ny * dz);
+            let (old_weights, old_materials) = row_of(old, from..from + len, &mut old_room);
+            let (new_weights, new_materials) = row_of(new, from..from + len, &mut new_room);
+            let (mut changed, mut flipped) = (0u64, 0u64);
+            if old_weights != new_weights {
+                for (bit, (old, new)) in old_weights.iter().zip(new_weights).enumerate() {
+                    changed |= u64::from(old != new) << bit;
+                    flipped |= u64::from(old.inside(threshold) != new.inside(threshold)) << bit;
+                }
+            }
+            if old_materials != new_materials {
+                for (bit, (old, new)) in old_materials.iter().zip(new_materials).enumerate() {
+                    changed |= u64::from(old != new) << bit;
+                }
+            }
+            self.changed[row] |= changed << first_bit;
+            self.before[row] ^= flipped << first_bit;
+        }
+    }
+
+    /// The ends of edges with vertices that depend on changed samples, and corners of cells with such triangles.
+    /// `changed`: the box that the changed samples are in, [`REACH`] inside of what was read.
+    fn shows(&self, changed: Region, topology: Topology) -> Vec<u64> {
+        let ny = self.read.size()[1] as usize;
+        let mut shows = vec![0; self.now.len()];
+        for (row, ..) in self.rows_of(changed.grown(1, 1)) {
+            let beside = [row - 1, row + 1, row - ny, row + ny];
+            let around = |rows: &[u64]| {
+                rows[row] << 1 | rows[row] >> 1 | beside.iter().fold(0, |all, beside| all | rows[*beside])
+            };
+            let near = self.changed[row] | around(&self.changed);
+            if near == 0 {
+                continue;
+            }
+            // Samples with a neighbour of the other sign. At the ends of what was read, that is not true, but nothing changed.
+            let ends = |signs: &[u64]| {
+                let apart = beside.iter().fold(0, |all, beside| all | (signs[row] ^ signs[*beside]));
+                apart | (signs[row] ^ signs[row] << 1) | (signs[row] ^ signs[row] >> 1)
+            };
+            shows[row] = near & (ends(self.now) | ends(&self.before));
+            if topology == Topology::Trilinear {
+                // Samples not all of whose 26 neighbours have their sign.
+                let mixed = |signs: &[u64]| {
+                    let nine = || [row - ny, row, row + ny].into_iter().flat_map(|row| &signs[row - 1..row + 2]);
+                    let (any, all) = nine().fold((0, u64::MAX), |(any, all), word| (any | word, all & word));
+                    (any | any << 1 | any >> 1) & !(all & all << 1 & all >> 1)
+                };
+                shows[row] |= near & (mixed(self.now) | mixed(&self.before));
+            }
+        }
+        shows
+    }
+
+    /// The rows of a box within what was read: number, y and z, and which of its samples lie in the box.
+    fn rows_of(&self, part: Region) -> impl Iterator<Item = (usize, [i32; 2], u64)> + use<> {
+        let (read, ny) = (self.read, self.read.size()[1] as usize);
+        let ends = [part.min[0], part.max[0]].map(|x| (1u128 << (x - read.min[0]).clamp(0, 64)) - 1);
+        let mask = (ends[1] & !ends[0]) as u64;
+        (part.min[2]..part.max[2]).flat_map(move |z| {
+            (part.min[1]..part.max[1]).map(move |y| {
+                let row = (y - read.min[1]) as usize + ny * (z - read.min[2]) as usize;
+                (row, [y, z], mask)
+            })
+        })
+    }
+}
+
+/// The weights and the materials of a chunk's samples in a row of at most 64, where they are; those of a uniform chunk
+/// are written to `room`.
+fn row_of<'a, W: Weight>(
+    chunk: &'a Chunk<W>,
+    indices: Range<usize>,
+    room: &'a mut ([W; 64], [u8; 64]),
+) -> (&'a [W], &'a [u8]) {
+    match chunk {
+        Chunk::Samples(samples) => (&samples.weights[indices.clone()], &samples.materials[indices]),
+        Chunk::Uniform(voxel) => {
+            let (weights, materials) = (&mut room.0[..indices.len()], &mut room.1[..indices.len()]);
+            weights.fill(voxel.weight);
+            materials.fill(voxel.material);
+            (weights, materials)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::brush::{BrushShape, Operation, Stamp};
+    use crate::{MeshBuffer, Mesher, Voxel};
+
+    const CELLS: u32 = 8;
+    const CHUNKS: Region = Region::new([-1; 3], [2; 3]);
+
+    /// Hills, with distances up to where edits no longer reach; or noise.
+    fn ground(seed: u32, bounded: bool, is_noise: bool) -> Grid<i16> {
+        let mut grid = if bounded { Grid::bounded(CELLS, CHUNKS) } else { Grid::new(CELLS) }.unwrap();
+        let [a, b] = [seed % 7, seed % 5].map(f64::from);
+        let hills = move |[x, y, z]: [f64; 3]| y - 6.0 - (x / (3.0 + a)).sin() * 3.0 - (z / (2.0 + b)).cos() * 2.0;
+        let noise = move |p: [f64; 3]| {
+            let bits = p
+                .iter()
+                .fold(seed, |bits, v| (bits ^ (*v as i32).cast_unsigned()).wrapping_mul(0x9e37_79b1) ^ bits >> 15);
+            f64::from(bits % 4096) / 512.0 - 4.0
+        };
+        for position in CHUNKS.points() {
+            if is_noise { grid.fill(position, &noise, 1.0) } else { grid.fill(position, &hills, 1.0) }.unwrap();
+        }
+        grid.take_dirty();
+        grid
+    }
+
+    fn stamp() -> impl Strategy<Value = Stamp> {
+        let place = || prop::array::uniform3(-10.0..18.0f64);
+        let shape = prop_oneof![
+            (place(), 0.5..7.0f64).prop_map(|(center, radius)| BrushShape::sphere(center, radius).unwrap()),
+            (place(), prop::array::uniform3(0.5..6.0f64))
+                .prop_map(|(center, half)| BrushShape::cuboid(center, half).unwrap()),
+        ];
+        let operation = prop_oneof![Just(Operation::Dig), Just(Operation::Add), Just(Operation::Paint)];
+        (shape, operation).prop_map(|(shape, operation)| Stamp::new(shape, operation, 3))
+    }
+
+    fn mesh(grid: &Grid, position: [i32; 3], settings: &MeshSettings) -> MeshBuffer {
+        let mut mesh = MeshBuffer::new();
+        grid.mesh_chunk(position, &mut Mesher::new(), settings, &mut mesh).unwrap();
+        mesh
+    }
+
+    fn chunks(grid: &Grid) -> BTreeMap<[i32; 3], Chunk> {
+        grid.chunks().map(|(position, chunk)| (position, chunk.clone())).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn chunks_that_are_not_redrawn_look_the_same(
+            seed in any::<u32>(),
+            [bounded, is_noise, exact] in any::<[bool; 3]>(),
+            isovalue in prop_oneof![Just(0.0f32), -2.0..2.0f32],
+            stamps in prop::collection::vec(stamp(), 1..3),
+        ) {
+            let before = ground(seed, bounded, is_noise);
+            let mut after = before.clone();
+            let changed = stamps.iter().fold(Region::new([0; 3], [0; 3]), |all, stamp| all.union(&after.apply(stamp).region));
+            let affected = after.chunks_affected_by(changed);
+            let mut old = chunks(&before);
+            for position in affected.points() {
+                old.entry(position).or_insert(Chunk::AIR);
+            }
+            let topology = if exact { Topology::Trilinear } else { Topology::Separated };
+            let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
+            let redrawn = after.chunks_redrawn(&old, changed, &settings);
+            prop_assert!(redrawn.is_some() || bounded && isovalue > 0.0);
+            for position in affected.points() {
+                let looks_the_same = || mesh(&before, position, &settings) == mesh(&after, position, &settings);
+                let is_redrawn = redrawn.as_ref().is_none_or(|redrawn| redrawn.contains(&position));
+                prop_assert!(is_redrawn || looks_the_same(), "chunk {:?}", position);
+            }
+        }
+    }
+
+    /// One sample of ground in the air, in all places around a corner of eight chunks; with each sample around it changed.
+    #[test]
+    fn a_change_that_shows_is_never_missed() {
+        let (settings, mut shown, mut hidden) = (MeshSettings::default(), 0, 0);
+        for ground in Region::new([-2; 3], [2; 3]).points() {
+            let mut before = Grid::new(CELLS).unwrap();
+            for position in CHUNKS.points() {
+                // Nowhere alike, so that all that normals depend on has an effect.
+                before.fill(position, &|[x, y, z]: [f64; 3]| 3.0 + 0.03 * x + 0.05 * y + 0.07 * z, 1.0).unwrap();
+            }
+            before.set(ground, Voxel::new(-300, 1)).unwrap();
+            let old = chunks(&before);
+            let meshes = Region::new([-1; 3], [1; 3]).points().map(|position| mesh(&before, position, &settings));
+            let meshes: Vec<_> = meshes.collect();
+            for point in Region::new(ground, ground).grown(3, 4).points() {
+                let mut after = before.clone();
+                after.set(point, Voxel::new(before.get(point).weight - 9, 2)).unwrap();
+                let changed = Region::new(point, point).grown(0, 1);
+                let redrawn = after.chunks_redrawn(&old, changed, &settings).unwrap();
+                for (position, mesh_before) in Region::new([-1; 3], [1; 3]).points().zip(&meshes) {
+                    let is_redrawn = redrawn.contains(&position);
+                    *if is_redrawn { &mut shown } else { &mut hidden } += 1;
+                    assert!(
+                        is_redrawn || mesh(&after, position, &settings) == *mesh_before,
+                        "{ground:?}, {point:?}, chunk {position:?}"
+                    );
+                }
+            }
+        }
+        assert!(shown > 1000 && hidden > 1000, "{shown}, {hidden}");
+    }
+
+    /// A ball dug into flat ground: what it reaches deep below does not show.
+    #[test]
+    fn few_chunks_are_redrawn() {
+        let mut grid = Grid::new(16).unwrap();
+        for position in CHUNKS.points() {
+            grid.fill(position, &|[_, y, _]: [f64; 3]| y - 6.5, 1.0).unwrap();
+        }
+        let (before, settings) = (chunks(&grid), MeshSettings::default());
+        let ball = BrushShape::sphere([8.0, 6.5, 8.0], 3.0).unwrap();
+        let changed = grid.apply(&Stamp::new(ball, Operation::Dig, 0)).region;
+        let affected = grid.chunks_affected_by(changed).points().count();
+        assert_eq!(grid.chunks_redrawn(&before, changed, &settings), Some(BTreeSet::from([[0; 3]])));
+        assert!(affected > 1, "{affected}");
+        assert_eq!(
+            grid.chunks_redrawn(&chunks(&grid), changed, &settings),
+            Some(BTreeSet::new()),
+            "nothing has changed"
+        );
+        let not_finite = MeshSettings { isovalue: f32::NAN, ..settings };
+        assert_eq!(grid.chunks_redrawn(&before, changed, &not_finite), None);
+        assert_eq!(grid.chunks_redrawn(&before, Region::new([0; 3], [61, 1, 1]), &settings), None);
+        assert_eq!(grid.chunks_redrawn(&before, Region::new([0; 3], [0; 3]), &settings), Some(BTreeSet::new()));
+        let ends = Region::new([i32::MIN; 3], [i32::MIN + 1; 3]);
+        assert_eq!(grid.chunks_redrawn(&before, ends, &settings), None);
+    }
+}
