@@ -342,6 +342,8 @@ fn show_group(terrain: Entity, volume: &mut TerrainVolume, group: Group, screen:
         let Some(state) = volume.chunks.get(&key) else { continue };
         let is_new = || !volume.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk));
         if (group.chunks.contains(&key) || !state.drawn) && is_new() {
+            let replaced = volume.shown.unload(position);
+            replaced.into_iter().for_each(|replaced| volume.spare.keep(replaced));
             volume.shown.load(position, chunk).expect("a chunk of the same extent");
         }
     }

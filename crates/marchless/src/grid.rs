@@ -4,6 +4,7 @@ mod block;
 pub(crate) mod border;
 mod chunk;
 mod redrawn;
+mod spare;
 #[cfg(test)]
 mod tests;
 
@@ -14,6 +15,7 @@ use thiserror::Error;
 pub use self::block::{Block, Neighbourhood};
 use self::border::Border;
 pub use self::chunk::{Chunk, ChunkSamples};
+pub use self::spare::SpareSamples;
 use crate::buffer::MeshBuffer;
 use crate::lattice::Region;
 use crate::mesher::{MeshError, MeshSettings, Mesher};
@@ -127,7 +129,7 @@ impl<W: Weight> Grid<W> {
         let voxel = Voxel { weight, ..voxel };
         if self.get(point) != voxel {
             let (cells, index) = (self.cells, self.index(point));
-            let samples = self.chunk_mut(position)?.samples_mut(cells);
+            let samples = self.chunk_mut(position)?.samples_mut(cells, &mut SpareSamples::new());
             samples.weights[index] = voxel.weight;
             samples.materials[index] = voxel.material;
             self.mark_dirty(Region::new(point, point).grown(0, 1));

@@ -112,6 +112,7 @@ pub use buffer::MeshBuffer;
 pub use cell::{CaseIndex, Corner, Edge, Face};
 pub use grid::{
     Block, Chunk, ChunkSamples, DEFAULT_CHUNK_CELLS, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, Neighbourhood,
+    SpareSamples,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 #[cfg(feature = "std")]

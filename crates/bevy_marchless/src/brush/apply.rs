@@ -146,7 +146,7 @@ pub(crate) fn apply_waiting_stamps(volume: &mut TerrainVolume, position: [i32; 3
 
 /// Applies a stamp to a chunk's samples, and returns a box around those that changed.
 fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Stamp) -> Region {
-    let edit = volume.grid.apply_to_chunk(position, stamp);
+    let edit = volume.grid.apply_to_chunk(position, stamp, &mut volume.spare);
     if !edit.is_empty() {
         volume.edited.insert(position);
         if let Some(state) = volume.chunks.get_mut(&ChunkKey::finest(position)) {

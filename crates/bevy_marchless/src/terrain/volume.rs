@@ -7,7 +7,7 @@ use bevy_ecs::prelude::*;
 use bevy_math::IVec3;
 use bevy_platform::collections::{HashMap, HashSet};
 use bevy_reflect::prelude::*;
-use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, Region, Stamp};
+use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, Region, SpareSamples, Stamp};
 
 use super::{Signs, Terrain};
 use crate::bits::BitsCache;
@@ -49,6 +49,9 @@ pub struct TerrainVolume {
     /// Stamps that came before a chunk's samples, in order.
     #[reflect(ignore)]
     pub(crate) stamps: HashMap<[i32; 3], Vec<Arc<Stamp>>>,
+    /// Memory for samples that stamps change.
+    #[reflect(ignore)]
+    pub(crate) spare: SpareSamples,
     /// What stamps have changed in this update.
     #[reflect(ignore)]
     pub(crate) edit: Edit,
@@ -162,6 +165,7 @@ impl Default for TerrainVolume {
             streaming: Streaming::default(),
             edited: HashSet::default(),
             stamps: HashMap::default(),
+            spare: SpareSamples::new(),
             edit: Edit::NONE,
             filling: 0,
             unfilled: 0,

@@ -2,7 +2,7 @@
 
 use super::{EDIT_LIMIT, Edit, Stamp, change::Change};
 use crate::{
-    grid::{Chunk, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, border::Border},
+    grid::{Chunk, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples, border::Border},
     lattice::Region,
     sample::Voxel,
 };
@@ -18,8 +18,9 @@ impl Grid<i16> {
         }
         let last = touched.max.map(|v| v - 1);
         let chunks = Region::new(self.chunk_of(touched.min), self.chunk_of(last).map(|v| v + 1));
+        let mut spare = SpareSamples::new();
         for position in self.bounds().map_or(chunks, |bounds| bounds.intersection(&chunks)).points() {
-            edit.merge(&self.apply_to_chunk(position, stamp));
+            edit.merge(&self.apply_to_chunk(position, stamp, &mut spare));
         }
         edit
     }
@@ -28,21 +29,21 @@ impl Grid<i16> {
     /// is no place for a chunk.
     ///
     /// Applied to every chunk, each in its own time but with the stamps in the same order, it gives the same samples as
-    /// [`Grid::apply`].
-    pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &Stamp) -> Edit {
-        let edit = self.change_chunk(position, stamp).unwrap_or_default();
+    /// [`Grid::apply`]. `spare`: memory for a copy of the samples, which is made where clones of the chunk are there.
+    pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &Stamp, spare: &mut SpareSamples) -> Edit {
+        let edit = self.change_chunk(position, stamp, spare).unwrap_or_default();
         self.mark_dirty(edit.region);
         edit
     }
 
-    fn change_chunk(&mut self, position: [i32; 3], stamp: &Stamp) -> Result<Edit, GridError> {
+    fn change_chunk(&mut self, position: [i32; 3], stamp: &Stamp, spare: &mut SpareSamples) -> Result<Edit, GridError> {
         let (cells, planes, origin) = (self.chunk_cells(), self.planes(), self.chunk_region(position).min);
         self.check(position)?;
         if self.chunk(position).is_some() {
-            return Ok(self.chunk_mut(position)?.apply_stamp(origin, cells, planes, stamp));
+            return Ok(self.chunk_mut(position)?.change(origin, cells, planes, stamp, spare));
         }
         let mut chunk = Chunk::AIR;
-        let edit = chunk.apply_stamp(origin, cells, planes, stamp);
+        let edit = chunk.change(origin, cells, planes, stamp, spare);
         if !edit.is_empty() {
             *self.chunk_mut(position)? = chunk;
         }
@@ -58,6 +59,17 @@ impl Chunk<i16> {
     /// of a bounded grid ([`Grid::planes`]): its border stays closed, and nothing changes beyond. Nothing changes
     /// either in a chunk whose samples are not `cells³`, or where no chunk has so many.
     pub fn apply_stamp(&mut self, origin: [i32; 3], cells: u32, planes: Option<Region>, stamp: &Stamp) -> Edit {
+        self.change(origin, cells, planes, stamp, &mut SpareSamples::new())
+    }
+
+    fn change(
+        &mut self,
+        origin: [i32; 3],
+        cells: u32,
+        planes: Option<Region>,
+        stamp: &Stamp,
+        spare: &mut SpareSamples,
+    ) -> Edit {
         let chunk = Region::new(origin, origin.map(|v| v.saturating_add_unsigned(cells)));
         let area = planes.map_or(chunk, |planes| chunk.intersection(&planes)).intersection(&stamp.region());
         let cells_fit = (MIN_CHUNK_CELLS..=MAX_CHUNK_CELLS).contains(&cells) && self.check(cells).is_ok();
@@ -77,7 +89,7 @@ impl Chunk<i16> {
             }
             return edit;
         }
-        pass.run(self)
+        pass.run(self, spare)
     }
 }
 
@@ -110,7 +122,7 @@ impl Pass {
     }
 
     /// Applies the change sample by sample.
-    fn run(&self, chunk: &mut Chunk<i16>) -> Edit {
+    fn run(&self, chunk: &mut Chunk<i16>, spare: &mut SpareSamples) -> Edit {
         let mut edit = Edit::NONE;
         let xs = self.area.min[0]..self.area.max[0];
         let [_, ny, nz] = self.area.size();
@@ -122,7 +134,7 @@ impl Pass {
             })
         });
         let Some(first_changed) = first_changed else { return edit };
-        let samples = chunk.samples_mut(self.cells);
+        let samples = chunk.samples_mut(self.cells, spare);
         for row in first_changed..ny * nz {
             let ([y, z], start) = self.row(row);
             let mut changed = None;

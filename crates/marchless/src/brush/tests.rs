@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    grid::{Chunk, Grid},
+    grid::{Chunk, Grid, SpareSamples},
     sample::Voxel,
 };
 
@@ -272,7 +272,7 @@ proptest! {
         let mut edit_in_turns = Edit::NONE;
         for chunk in turns.into_iter().chain((0..8).flat_map(|chunk| vec![chunk; stamps.len()])) {
             if let Some(stamp) = stamps.get(done[chunk]) {
-                edit_in_turns.merge(&in_turns.apply_to_chunk(positions[chunk], stamp));
+                edit_in_turns.merge(&in_turns.apply_to_chunk(positions[chunk], stamp, &mut SpareSamples::new()));
                 done[chunk] += 1;
             }
         }

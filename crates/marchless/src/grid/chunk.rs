@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::border::{Border, larger, layer_indices};
-use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS};
+use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples};
 use crate::sample::{Voxel, Weight};
 use crate::source::{BOUND_MARGIN, Bound, Source, SourceRegion};
 
@@ -115,14 +115,14 @@ impl<W: Weight> Chunk<W> {
     }
 
     /// The samples, to be changed: a uniform chunk is written out, a shared one copied.
-    pub(crate) fn samples_mut(&mut self, cells: u32) -> &mut ChunkSamples<W> {
+    pub(crate) fn samples_mut(&mut self, cells: u32, spare: &mut SpareSamples<W>) -> &mut ChunkSamples<W> {
         if let Self::Uniform(voxel) = *self {
             let len = (cells as usize).pow(3);
             let (weights, materials) = (vec![voxel.weight; len], vec![voxel.material; len]);
             *self = Self::Samples(Arc::new(ChunkSamples { weights, materials }));
         }
         match self {
-            Self::Samples(samples) => Arc::make_mut(samples),
+            Self::Samples(samples) => spare.make_mut(samples),
             Self::Uniform(_) => unreachable!("written out above"),
         }
     }
@@ -137,7 +137,7 @@ impl<W: Weight> Chunk<W> {
                 Self::Samples(samples) => layer_indices(axis, layer, size).any(|index| samples.weights[index] < least),
             };
             if below {
-                let weights = &mut self.samples_mut(cells).weights;
+                let weights = &mut self.samples_mut(cells, &mut SpareSamples::new()).weights;
                 for index in layer_indices(axis, layer, size) {
                     weights[index] = larger(weights[index], least);
                 }

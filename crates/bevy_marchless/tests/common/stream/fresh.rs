@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use bevy_marchless::prelude::*;
-use marchless::{Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Region};
+use marchless::{Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Region, SpareSamples};
 
 /// A plain world beside the plugin's: only the core, no entity, no task.
 pub struct Fresh {
@@ -35,7 +35,7 @@ impl Fresh {
         for position in Region::new(low, high.map(|v| v + 1)).intersection(&self.extent()).points() {
             self.edited.insert(position);
             if self.grid.chunk(position).is_some() {
-                self.grid.apply_to_chunk(position, stamp);
+                self.grid.apply_to_chunk(position, stamp, &mut SpareSamples::new());
             } else {
                 self.stamps.entry(position).or_default().push(*stamp);
             }
@@ -60,7 +60,7 @@ impl Fresh {
             let chunk = Chunk::from_source(source.as_ref(), position, self.terrain.chunk_cells, spacing);
             self.grid.load(position, chunk).expect("a chunk of the extent");
             for stamp in self.stamps.remove(&position).unwrap_or_default() {
-                self.grid.apply_to_chunk(position, &stamp);
+                self.grid.apply_to_chunk(position, &stamp, &mut SpareSamples::new());
             }
         }
         self.grid.chunk(position).expect("it has just been put there")

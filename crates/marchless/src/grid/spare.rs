@@ -1,0 +1,88 @@
+//! [`SpareSamples`]: memory for copies of samples that are to be changed.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use super::{Chunk, ChunkSamples};
+
+/// The memory of samples that edits have replaced, for the copies that later edits begin with.
+///
+/// Where allocators give what is freed back to the thread that allocated it, as many do, copies of samples that came from
+/// other threads take new memory each time, and each page of it has to be mapped, which takes longer than copying.
+#[derive(Debug)]
+pub struct SpareSamples<W = i16>(Vec<Arc<ChunkSamples<W>>>);
+
+/// As many chunks as a small edit changes at most.
+const MOST: usize = 8;
+
+impl<W> SpareSamples<W> {
+    /// No memory.
+    pub const fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    /// Keeps a chunk's memory, unless some clone of it is still there, or enough has been kept.
+    pub fn keep(&mut self, chunk: Chunk<W>) {
+        if let Chunk::Samples(mut samples) = chunk
+            && self.0.len() < MOST
+            && Arc::get_mut(&mut samples).is_some()
+        {
+            self.0.push(samples);
+        }
+    }
+}
+
+impl<W: Clone> SpareSamples<W> {
+    /// Makes samples the caller's own, to be changed: where clones of them are there, a copy takes their place.
+    pub(super) fn make_mut<'a>(&mut self, samples: &'a mut Arc<ChunkSamples<W>>) -> &'a mut ChunkSamples<W> {
+        if Arc::get_mut(samples).is_none()
+            && let Some(mut copy) = self.0.pop()
+            && let Some(room) = Arc::get_mut(&mut copy)
+        {
+            room.weights.clone_from(&samples.weights);
+            room.materials.clone_from(&samples.materials);
+            *samples = copy;
+        }
+        Arc::make_mut(samples)
+    }
+}
+
+impl<W> Default for SpareSamples<W> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+
+    fn samples(weight: i16) -> Arc<ChunkSamples> {
+        Arc::new(ChunkSamples { weights: vec![weight; 512], materials: vec![7; 512] })
+    }
+
+    #[test]
+    fn memory_is_used_again_for_copies_only() {
+        let mut spare = SpareSamples::new();
+        let old = samples(1);
+        let address = old.weights.as_ptr();
+        spare.keep(Chunk::Samples(old.clone()));
+        assert!(spare.0.is_empty(), "there is a clone");
+        spare.keep(Chunk::AIR);
+        spare.keep(Chunk::Samples(old));
+        let mut own = samples(2);
+        let own_address = own.weights.as_ptr();
+        assert_eq!(spare.make_mut(&mut own).weights.as_ptr(), own_address, "nobody else has it");
+        let clone = own.clone();
+        spare.make_mut(&mut own).weights[3] = 5;
+        assert_eq!((own.weights.as_ptr(), own.weights[2], own.weights[3], own.materials[3]), (address, 2, 5, 7));
+        assert_eq!(clone, samples(2));
+        let clone = own.clone();
+        spare.make_mut(&mut own).weights[4] = 6;
+        assert_eq!((own.weights[3], own.weights[4], clone.weights[4]), (5, 6, 2), "copied without spare memory");
+        (0..2 * MOST).for_each(|_| spare.keep(Chunk::Samples(samples(3))));
+        assert_eq!(spare.0.len(), MOST);
+    }
+}
