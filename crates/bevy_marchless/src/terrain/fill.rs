@@ -9,7 +9,7 @@ use bevy_platform::time::Instant;
 use marchless::Chunk;
 
 use super::{Fill, Signs, Terrain, TerrainVolume};
-use crate::brush::apply_waiting_stamps;
+use crate::brush::{StampQueue, apply_waiting_stamps};
 use crate::chunk::ChunkKey;
 use crate::schedule::MarchlessSettings;
 use crate::stats::MainThread;
@@ -72,11 +72,15 @@ pub(crate) fn take_filled_chunks(
     mut waiting: Local<VecDeque<Filled>>,
     mut volumes: Query<&mut TerrainVolume>,
     settings: Res<MarchlessSettings>,
+    stamps: Option<Res<StampQueue>>,
     mut stats: ResMut<StreamStats>,
     mut main_thread: ResMut<MainThread>,
 ) {
     let start = main_thread.start();
-    let until = main_thread.until(start, settings.main_thread / 4 * 3);
+    // New edits come first, unless they wait for samples.
+    let edits = stamps.is_some_and(|it| !it.is_empty()) && !volumes.iter().any(|it| it.streaming.holds_stamps);
+    let share = if edits { settings.main_thread / 8 } else { settings.main_thread / 4 * 3 };
+    let until = main_thread.until(start, share);
     waiting.extend(results.0.take());
     let mut taken = 0;
     while (taken < LEAST || Instant::now() < until)
