@@ -41,6 +41,26 @@ fn a_stamp_at_a_corner_of_chunks_changes_all_of_them_at_once() {
 }
 
 #[test]
+fn what_changes_out_of_sight_is_shown_without_meshing() {
+    let mut app = app();
+    let terrain = settled(&mut app, ground());
+    let meshed = |app: &App| app.world().resource::<StreamStats>().meshed;
+    let before = meshed(&app);
+    let ball = |y: f32, radius: f32| BrushShape::sphere(Vec3::new(14.0, y, 14.0), radius);
+    assert_eq!(changed_by(&mut app, Stamp::paint(terrain, ball(7.0, 3.0), 4)), [], "deep below ground");
+    assert_eq!(meshed(&app), before);
+    assert!(volume(&app, terrain).is_settled());
+    assert_eq!(volume(&app, terrain).shown().get([14, 7, 14]).material, 4);
+    // In the same update, what is out of sight does not take what shows from the screen.
+    app.world_mut().write_message(Stamp::dig(terrain, ball(16.0, 5.0)));
+    changed_by(&mut app, Stamp::paint(terrain, ball(4.0, 2.0), 5));
+    assert!(meshed(&app) > before);
+    assert_drawn(&mut app, terrain);
+    assert!(!changed_by(&mut app, Stamp::dig(terrain, ball(10.0, 5.0))).is_empty());
+    assert_drawn(&mut app, terrain);
+}
+
+#[test]
 fn a_group_too_large_for_the_update_changes_in_one_later_update() {
     let mut app = app();
     app.insert_resource(MarchlessSettings { inline_chunks: 3, ..MarchlessSettings::default() });

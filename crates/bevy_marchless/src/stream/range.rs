@@ -90,36 +90,41 @@ impl Grown {
         self.range.extent.contains(position) && self.row(y, z).contains(&x)
     }
 
-    /// All chunks, row by row: y, z, and which x.
-    pub(crate) fn rows(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
-        let [y, z] = [1, 2].map(|axis| self.reach(axis, self.range.radii[axis]));
-        z.flat_map(move |z| y.clone().map(move |y| (y, z, self.row(y, z)))).filter(|(.., row)| !row.is_empty())
-    }
-
     /// How many chunks there are.
     pub(crate) fn len(&self) -> u64 {
-        self.rows().map(|(.., row)| row.len() as u64).sum()
+        self.table().rows().map(|(.., row)| row.len() as u64).sum()
     }
 
     /// Which chunks of a row belong to it.
     fn row(&self, y: i32, z: i32) -> ops::Range<i32> {
-        let Range { middle, radii, is_box, extent } = &self.range;
-        let beyond = |axis: usize, position: i32| {
-            let low = f64::from(position) - self.by;
-            let nearest = middle[axis].clamp(low, low + 1.0 + 2.0 * self.by);
-            (nearest - middle[axis]) / radii[axis]
-        };
-        let (y_beyond, z_beyond) = (beyond(1, y), beyond(2, z));
-        let left = if *is_box {
-            if y_beyond.abs() <= 1.0 && z_beyond.abs() <= 1.0 { 1.0 } else { -1.0 }
-        } else {
-            1.0 - y_beyond * y_beyond - z_beyond * z_beyond
-        };
+        let extent = &self.range.extent;
         let is_there = |axis: usize, position: i32| (extent.min[axis]..extent.max[axis]).contains(&position);
-        if left < 0.0 || !is_there(1, y) || !is_there(2, z) {
-            return 0..0;
-        }
-        self.reach(0, radii[0] * left.sqrt())
+        if is_there(1, y) && is_there(2, z) { self.row_at(self.square(1, y), self.square(2, z)) } else { 0..0 }
+    }
+
+    /// The same, from the squares of how far the row lies along y and z.
+    fn row_at(&self, y: f64, z: f64) -> ops::Range<i32> {
+        let left = match self.range.is_box {
+            true if y <= 1.0 && z <= 1.0 => 1.0,
+            true => -1.0,
+            false => 1.0 - y - z,
+        };
+        if left < 0.0 { 0..0 } else { self.reach(0, self.range.radii[0] * left.sqrt()) }
+    }
+
+    /// The square of how far the points of a chunk that are nearest to the middle lie from it along an axis, in radii.
+    fn square(&self, axis: usize, position: i32) -> f64 {
+        let low = f64::from(position) - self.by;
+        let middle = self.range.middle[axis];
+        let beyond = (middle.clamp(low, low + 1.0 + 2.0 * self.by) - middle) / self.range.radii[axis];
+        beyond * beyond
+    }
+
+    /// Prepares for looking at all rows.
+    fn table(&self) -> Table {
+        let reach = |axis: usize| self.reach(axis, self.range.radii[axis]);
+        let squares = |axis: usize| reach(axis).map(|position| self.square(axis, position)).collect();
+        Table { grown: *self, from: [reach(1).start, reach(2).start], y: squares(1), z: squares(2) }
     }
 
     /// The positions along an axis of chunks that come as near as `radius` to the middle.
@@ -129,6 +134,36 @@ impl Grown {
         let to = floor(middle + radius + self.by).saturating_add(1);
         let (from, to) = (from.max(extent.min[axis]), to.min(extent.max[axis]));
         from..to.max(from)
+    }
+}
+
+/// A [`Grown`] with what all its rows have in common.
+struct Table {
+    grown: Grown,
+    /// The first y and z.
+    from: [i32; 2],
+    /// The squares of each, from there on.
+    y: Vec<f64>,
+    z: Vec<f64>,
+}
+
+impl Table {
+    /// All chunks, row by row: y, z, and which x; some rows are empty.
+    fn rows(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
+        let [first_y, first_z] = self.from;
+        (first_z..).zip(&self.z).flat_map(move |(z, &z_square)| {
+            (first_y..).zip(&self.y).map(move |(y, &y_square)| (y, z, self.grown.row_at(y_square, z_square)))
+        })
+    }
+
+    /// Which chunks of a row belong to it.
+    fn row(&self, y: i32, z: i32) -> ops::Range<i32> {
+        let square =
+            |squares: &[f64], from: i32, at: i32| squares.get(usize::try_from(at.checked_sub(from)?).ok()?).copied();
+        match (square(&self.y, self.from[0], y), square(&self.z, self.from[1], z)) {
+            (Some(y), Some(z)) => self.grown.row_at(y, z),
+            _ => 0..0,
+        }
     }
 }
 
@@ -279,14 +314,19 @@ fn as_number(urgencies: impl Iterator<Item = f64>) -> u32 {
 
 /// What is in ranges and not in others, border by border. The second border is around the first.
 fn difference(these: [Option<Grown>; 3], others: [Option<Grown>; 3], take: &mut impl FnMut([i32; 3])) {
-    for (border, range) in these.iter().enumerate() {
-        let Some(range) = range else { continue };
+    let others = others.map(|other| other.map(|other| other.table()));
+    let row_of = |border: usize, y: i32, z: i32| others[border].as_ref().map_or(0..0, |other| other.row(y, z));
+    for (border, range) in these.into_iter().enumerate() {
+        let Some(range) = range.map(|range| range.table()) else { continue };
         for (y, z, mut row) in range.rows() {
-            let other = others[border].map_or(0..0, |other| other.row(y, z));
+            let other = row_of(border, y, z);
+            if row == other {
+                continue;
+            }
             let other = if other.is_empty() { row.start..row.start } else { other };
             // Of the first, what lies beyond the other's second is in the second's difference, too.
             if border == 0 {
-                let around = others[1].map_or(0..0, |around| around.row(y, z));
+                let around = row_of(1, y, z);
                 row = row.start.max(around.start)..row.end.min(around.end);
             }
             (row.start..row.end.min(other.start)).for_each(|x| take([x, y, z]));
@@ -326,7 +366,7 @@ mod tests {
         fn rows_hold_what_the_range_contains(range in range(), by in 0..2i32) {
             let grown = range.grown(by.into());
             let rows: BTreeSet<_> =
-                grown.rows().flat_map(|(y, z, row)| row.map(move |x| [x, y, z])).collect();
+                grown.table().rows().flat_map(|(y, z, row)| row.map(move |x| [x, y, z])).collect();
             prop_assert_eq!(grown.len(), rows.len() as u64);
             prop_assert_eq!(rows, set(&grown));
         }
