@@ -16,16 +16,16 @@ use bevy_ecs::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{DEFAULT_CHUNK_CELLS, MeshSettings, Region, Source};
+use marchless::{DEFAULT_CHUNK_CELLS, Grid, MeshSettings, Region, Source};
 use thiserror::Error;
 
 pub use extent::{Extent, Keep};
 
-pub(crate) use fill::{FillResults, fill_chunk};
+pub(crate) use fill::{FillResults, Repeat, fill_chunk};
 pub(crate) use prepare::prepare_terrains;
 pub(crate) use signs::Signs;
 pub use volume::TerrainVolume;
-pub(crate) use volume::{ChunkState, Fill, Group, Pending, same_samples};
+pub(crate) use volume::{ChunkState, Edits, Fill, Group, MOST_STAMPS, Pending, same_samples};
 
 use crate::chunk::{Chunk, ChunkGeometry};
 use crate::schedule::MarchlessSystems;
@@ -189,6 +189,11 @@ impl Terrain {
             return Err(TerrainError::Isovalue { found: self.isovalue });
         }
         Ok(())
+    }
+
+    /// A grid for its chunks; the settings have been checked.
+    pub(crate) fn empty_grid(&self) -> Grid<i16> {
+        Grid::bounded(self.chunk_cells, self.chunk_region()).expect("the settings have been checked")
     }
 
     /// The chunks that it has.

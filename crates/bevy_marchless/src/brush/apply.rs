@@ -145,10 +145,10 @@ pub(crate) fn apply_waiting_stamps(volume: &mut TerrainVolume, position: [i32; 3
 }
 
 /// Applies a stamp to a chunk's samples, and returns a box around those that changed.
-fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &marchless::Stamp) -> Region {
+fn change(volume: &mut TerrainVolume, position: [i32; 3], stamp: &Arc<marchless::Stamp>) -> Region {
     let edit = volume.grid.apply_to_chunk(position, stamp, &mut volume.spare);
     if !edit.is_empty() {
-        volume.edited.insert(position);
+        volume.edited.entry(position).or_default().push(stamp.clone());
         if let Some(state) = volume.chunks.get_mut(&ChunkKey::finest(position)) {
             state.signs = Signs::UNKNOWN;
         }

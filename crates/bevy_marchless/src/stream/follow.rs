@@ -21,7 +21,9 @@ use crate::chunk::ChunkKey;
 use crate::place::{Place, in_double_precision};
 use crate::schedule::MarchlessSettings;
 use crate::stats::MainThread;
-use crate::terrain::{ChunkState, Fill, FillResults, Signs, TerrainVolume, fill_chunk};
+use crate::terrain::{
+    ChunkState, Edits, Fill, FillResults, MOST_STAMPS, Repeat, Signs, Terrain, TerrainVolume, fill_chunk,
+};
 use crate::work::{Ticket, WorkQueue};
 
 /// Chunks per axis of the boxes that the source bounds at once.
@@ -30,8 +32,6 @@ const BOX: i32 = 4;
 const MOST_BOXES: usize = 4096;
 /// Each update at least so many chunks come, and as many go.
 const LEAST: usize = 4;
-/// So many stamps may wait for a chunk that is not loaded, before it is filled for their sake.
-const MOST_STAMPS: usize = 64;
 
 /// Which chunks of a terrain are loaded, and what is to be done about it.
 #[derive(Default)]
@@ -136,6 +136,14 @@ impl Streaming {
     fn next_arriving(&mut self) -> Option<ChunkKey> {
         let ranges = &self.ranges;
         self.arriving.pop(ranges, |key| ranges.wanted(key.position, Wanted::Samples) > Wanted::Gone)
+    }
+
+    /// What a chunk's samples take to be as they were when it was unloaded.
+    fn repeat(&mut self, edits: Option<&Edits>, terrain: &Terrain, position: [i32; 3]) -> Repeat {
+        let Some(Edits::Stamps(stamps)) = edits else { return Repeat::default() };
+        let (source, cells) = (terrain.source.get().as_ref(), terrain.chunk_cells);
+        let certain = self.bound(source, position, cells, f64::from(terrain.voxel_size));
+        Repeat { certain, stamps: stamps.clone() }
     }
 
     /// What the source is certain of without sampling. A source that panics is certain of nothing.
@@ -321,7 +329,9 @@ impl Follow<'_, '_, '_> {
         let volume = &mut *self.volume;
         if volume.grid.chunk(key.position).is_some() {
             volume.take_samples(key, None);
-        } else if let Some(chunk) = volume.streaming.bound(source.as_ref(), key.position, *cells, *spacing) {
+        } else if !volume.edited.contains_key(&key.position)
+            && let Some(chunk) = volume.streaming.bound(source.as_ref(), key.position, *cells, *spacing)
+        {
             self.stats.bounded += 1;
             let signs = Signs::of(&chunk, *isovalue);
             volume.take_samples(key, Some((chunk, signs)));
@@ -345,10 +355,7 @@ impl Follow<'_, '_, '_> {
             }
             Fill::Done => {
                 self.volume.set_unfilled(key);
-                if !self.volume.edited.contains(&key.position) {
-                    self.volume.grid.unload(key.position);
-                    self.volume.bits.forget(key.position);
-                }
+                self.volume.forget_samples(key.position);
             }
             Fill::Dropped => {}
         }
@@ -433,7 +440,7 @@ impl TerrainVolume {
         let is_done = |state: &ChunkState| state.wanted == Wanted::Mesh && state.drawn && !state.stale;
         self.chunks.get(&key).is_some_and(|state| state.is_filled())
             && matches!(self.grid.chunk(key.position), Some(Chunk::Samples(_)))
-            && !self.edited.contains(&key.position)
+            && !self.edited.contains_key(&key.position)
             && key
                 .around()
                 .filter(|near| self.grid.bounds().is_none_or(|bounds| bounds.contains(near.position)))
@@ -506,7 +513,8 @@ pub(crate) fn ask_for_samples(
             let Some(key) = streaming.to_fill.pop(&streaming.ranges, waits) else { break };
             let Some(state) = chunks.get_mut(&key) else { break };
             let urgency = streaming.ranges.urgency(key.position);
-            let ticket = fill_chunk(entity, terrain, volume.filling, key.position, urgency, &queue, &results);
+            let repeat = streaming.repeat(volume.edited.get(&key.position), terrain, key.position);
+            let ticket = fill_chunk(entity, terrain, volume.filling, key.position, repeat, urgency, &queue, &results);
             state.fill = Fill::Asked(ticket);
             streaming.asked += 1;
         }
@@ -515,7 +523,8 @@ pub(crate) fn ask_for_samples(
         let crowded: Vec<_> = crowded.take(limit).collect();
         for position in crowded {
             if !volume.chunks.contains_key(&ChunkKey::finest(position)) && !streaming.remote.contains_key(&position) {
-                let ticket = fill_chunk(entity, terrain, volume.filling, position, u32::MAX, &queue, &results);
+                let repeat = streaming.repeat(volume.edited.get(&position), terrain, position);
+                let ticket = fill_chunk(entity, terrain, volume.filling, position, repeat, u32::MAX, &queue, &results);
                 streaming.remote.insert(position, ticket);
                 streaming.asked += 1;
             }

@@ -3,10 +3,11 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use bevy_platform::time::Instant;
-use marchless::Chunk;
+use marchless::{Chunk, Grid, SpareSamples, Stamp};
 
 use super::{Fill, Signs, Terrain, TerrainVolume};
 use crate::brush::{StampQueue, apply_waiting_stamps};
@@ -28,18 +29,36 @@ pub(crate) struct Filled {
     terrain: Entity,
     filling: u64,
     position: [i32; 3],
-    /// `None` where the source panicked.
-    sampled: Option<Sampled>,
-    time: Duration,
-}
-
-struct Sampled {
     chunk: Chunk<i16>,
     signs: Signs,
     /// What they are the signs of.
     isovalue: f32,
     /// Whether the source filled it, instead of being certain of it.
     filled: bool,
+    /// Whether the source panicked.
+    panicked: bool,
+    time: Duration,
+}
+
+/// What has been done to a chunk since it was first filled, and is to be done again.
+#[derive(Default)]
+pub(crate) struct Repeat {
+    /// The chunk, where the source was certain of it.
+    pub(crate) certain: Option<Chunk<i16>>,
+    pub(crate) stamps: Vec<Arc<Stamp>>,
+}
+
+impl Repeat {
+    /// Applies the stamps as the terrain's own grid did.
+    fn apply(&self, chunk: Chunk<i16>, position: [i32; 3], mut grid: Grid<i16>) -> Chunk<i16> {
+        if self.stamps.is_empty() || grid.load(position, chunk.clone()).is_err() {
+            return chunk;
+        }
+        for stamp in &self.stamps {
+            grid.apply_to_chunk(position, stamp, &mut SpareSamples::new());
+        }
+        grid.unload(position).unwrap_or(chunk)
+    }
 }
 
 /// Asks for the samples of a chunk; those of the lowest `urgency` come first.
@@ -48,21 +67,26 @@ pub(crate) fn fill_chunk(
     terrain: &Terrain,
     filling: u64,
     position: [i32; 3],
+    repeat: Repeat,
     urgency: u32,
     queue: &WorkQueue,
     results: &FillResults,
 ) -> Ticket {
-    let (source, results) = (terrain.source.get().clone(), results.0.clone());
+    let (source, results, grid) = (terrain.source.get().clone(), results.0.clone(), terrain.empty_grid());
     let (cells, spacing, isovalue) = (terrain.chunk_cells, f64::from(terrain.voxel_size), terrain.isovalue);
     queue.push(Priority::Fill(urgency), move || {
         let start = Instant::now();
-        let sample = || Chunk::from_source_counted(source.as_ref(), position, cells, spacing);
-        let chunk = catch_unwind(AssertUnwindSafe(sample)).ok();
-        let chunk = chunk.map(|(chunk, filled)| {
-            let signs = Signs::of(&chunk, isovalue);
-            Sampled { chunk, signs, isovalue, filled }
-        });
-        results.push(Filled { terrain: entity, filling, position, sampled: chunk, time: start.elapsed() });
+        let sample = || match &repeat.certain {
+            Some(chunk) => (chunk.clone(), false),
+            None => Chunk::from_source_counted(source.as_ref(), position, cells, spacing),
+        };
+        let sampled = catch_unwind(AssertUnwindSafe(sample));
+        let panicked = sampled.is_err();
+        let (chunk, filled) = sampled.unwrap_or((Chunk::AIR, false));
+        let chunk = repeat.apply(chunk, position, grid);
+        let signs = if panicked { Signs::UNKNOWN } else { Signs::of(&chunk, isovalue) };
+        let time = start.elapsed();
+        results.push(Filled { terrain: entity, filling, position, chunk, signs, isovalue, filled, panicked, time });
     })
 }
 
@@ -87,16 +111,15 @@ pub(crate) fn take_filled_chunks(
         && let Some(filled) = waiting.pop_front()
     {
         taken += 1;
-        let Filled { terrain, filling, position, sampled, time } = filled;
+        let Filled { terrain, filling, position, chunk, mut signs, isovalue, filled, panicked, time } = filled;
         let Ok(mut volume) = volumes.get_mut(terrain) else { continue };
         if volume.filling != filling {
             continue;
         }
         stats.fill_time += time;
-        let Sampled { chunk, mut signs, isovalue, filled } = sampled.unwrap_or_else(|| {
+        if panicked {
             bevy_log::error_once!("a terrain's source panicked; chunk {position:?} of terrain {terrain} stays air");
-            Sampled { chunk: Chunk::AIR, signs: Signs::UNKNOWN, isovalue: 0.0, filled: false }
-        });
+        }
         stats.filled += u64::from(filled);
         stats.filled_empty += u64::from(filled && !signs.may_have_surface());
         if volume.settings.as_ref().is_none_or(|settings| settings.isovalue != isovalue) {
@@ -113,9 +136,7 @@ pub(crate) fn take_filled_chunks(
                 volume.grid.load(position, chunk).expect("stamps wait within the extent only");
                 apply_waiting_stamps(volume, position);
                 volume.grid.take_dirty();
-                if !volume.edited.contains(&position) {
-                    volume.grid.unload(position);
-                }
+                volume.forget_samples(position);
             }
             _ => {}
         }

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::Grid;
 
 use super::{Fill, Signs, Terrain, TerrainError, TerrainVolume};
 use crate::chunk::{Chunk, ChunkKey, chunk_transform};
@@ -60,8 +59,8 @@ fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, commands: &mut Comm
     despawn_chunks(&former, commands);
     volume.settings = former.settings;
     volume.colors = former.colors;
-    volume.grid = empty_grid(terrain);
-    volume.shown = empty_grid(terrain);
+    volume.grid = terrain.empty_grid();
+    volume.shown = terrain.empty_grid();
     volume.shown_isovalue = terrain.isovalue;
     volume.filling = new_number();
 }
@@ -70,7 +69,7 @@ fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, commands: &mut Comm
 fn refill(terrain: &Terrain, volume: &mut TerrainVolume) {
     let extent = terrain.chunk_region();
     volume.forget_work();
-    volume.grid = empty_grid(terrain);
+    volume.grid = terrain.empty_grid();
     volume.edited.clear();
     volume.stamps.clear();
     volume.bits.clear();
@@ -131,8 +130,4 @@ fn same_samples(a: &Terrain, b: &Terrain) -> bool {
 /// Whether the same samples look the same.
 fn same_meshes(a: &Terrain, b: &Terrain) -> bool {
     a.isovalue == b.isovalue && a.normals == b.normals && a.palette == b.palette
-}
-
-fn empty_grid(terrain: &Terrain) -> Grid<i16> {
-    Grid::bounded(terrain.chunk_cells, terrain.chunk_region()).expect("the settings have been checked")
 }

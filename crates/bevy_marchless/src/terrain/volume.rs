@@ -22,7 +22,7 @@ use crate::work::{Ticket, new_number};
 #[derive(Component, Reflect)]
 #[reflect(Component, Default, from_reflect = false)]
 pub struct TerrainVolume {
-    /// The newest samples: of loaded chunks, and of all that were edited.
+    /// The newest samples: of loaded chunks, and of those that more stamps have changed than are kept.
     #[reflect(ignore)]
     pub(crate) grid: Grid<i16>,
     /// The samples as drawn, and those that chunks not drawn yet will have beside drawn ones.
@@ -43,9 +43,9 @@ pub struct TerrainVolume {
     /// Which chunks are loaded, and what is being done about it.
     #[reflect(ignore)]
     pub(crate) streaming: Streaming,
-    /// Chunks whose samples are not their source's alone; they are never forgotten.
+    /// What has changed samples since the source gave them; it is never forgotten.
     #[reflect(ignore)]
-    pub(crate) edited: HashSet<[i32; 3]>,
+    pub(crate) edited: HashMap<[i32; 3], Edits>,
     /// Stamps that came before a chunk's samples, in order.
     #[reflect(ignore)]
     pub(crate) stamps: HashMap<[i32; 3], Vec<Arc<Stamp>>>,
@@ -115,6 +115,33 @@ pub(crate) enum Fill {
     Dropped,
 }
 
+/// What has been done to a chunk's samples since the source gave them.
+pub(crate) enum Edits {
+    /// These stamps, in order, which can be applied again.
+    Stamps(Vec<Arc<Stamp>>),
+    /// So many that the samples stay instead, wherever viewers are.
+    Samples,
+}
+
+/// So many stamps wait for a chunk, and so many are kept for it: they take less memory than its samples.
+pub(crate) const MOST_STAMPS: usize = 64;
+
+impl Edits {
+    /// Notes one stamp more.
+    pub(crate) fn push(&mut self, stamp: Arc<Stamp>) {
+        match self {
+            Self::Stamps(stamps) if stamps.len() < MOST_STAMPS => stamps.push(stamp),
+            _ => *self = Self::Samples,
+        }
+    }
+}
+
+impl Default for Edits {
+    fn default() -> Self {
+        Self::Stamps(Vec::new())
+    }
+}
+
 /// Changed chunks that are to be meshed from one snapshot.
 #[derive(Debug, Default)]
 pub(crate) struct Pending {
@@ -163,7 +190,7 @@ impl Default for TerrainVolume {
             settings: None,
             colors: Arc::new([[1.0; 4]; 256]),
             streaming: Streaming::default(),
-            edited: HashSet::default(),
+            edited: HashMap::default(),
             stamps: HashMap::default(),
             spare: SpareSamples::new(),
             edit: Edit::NONE,
@@ -339,6 +366,14 @@ impl TerrainVolume {
             if let Some(state) = self.chunks.get_mut(&neighbour) {
                 state.missing += 1;
             }
+        }
+    }
+
+    /// Forgets the samples of a chunk that is not loaded, where they can be had again.
+    pub(crate) fn forget_samples(&mut self, position: [i32; 3]) {
+        if !matches!(self.edited.get(&position), Some(Edits::Samples)) {
+            self.grid.unload(position);
+            self.bits.forget(position);
         }
     }
 
