@@ -37,6 +37,8 @@ pub(crate) struct Filled {
     filled: bool,
     /// Whether the source panicked.
     panicked: bool,
+    /// How many stamps have been applied again.
+    repeated: usize,
     time: Duration,
 }
 
@@ -86,7 +88,19 @@ pub(crate) fn fill_chunk(
         let chunk = repeat.apply(chunk, position, grid);
         let signs = if panicked { Signs::UNKNOWN } else { Signs::of(&chunk, isovalue) };
         let time = start.elapsed();
-        results.push(Filled { terrain: entity, filling, position, chunk, signs, isovalue, filled, panicked, time });
+        let repeated = repeat.stamps.len();
+        results.push(Filled {
+            terrain: entity,
+            filling,
+            position,
+            chunk,
+            signs,
+            isovalue,
+            filled,
+            panicked,
+            repeated,
+            time,
+        });
     })
 }
 
@@ -111,9 +125,11 @@ pub(crate) fn take_filled_chunks(
         && let Some(filled) = waiting.pop_front()
     {
         taken += 1;
-        let Filled { terrain, filling, position, chunk, mut signs, isovalue, filled, panicked, time } = filled;
+        let Filled { terrain, filling, position, chunk, mut signs, isovalue, filled, panicked, repeated, time } =
+            filled;
         let Ok(mut volume) = volumes.get_mut(terrain) else { continue };
-        if volume.filling != filling {
+        // A job that took very long may have begun before the chunk's last edits.
+        if volume.filling != filling || volume.stamps_to_repeat(position) != repeated {
             continue;
         }
         stats.fill_time += time;

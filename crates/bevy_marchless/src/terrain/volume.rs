@@ -377,6 +377,14 @@ impl TerrainVolume {
         }
     }
 
+    /// How many stamps are to be applied again when a chunk's samples come from its source.
+    pub(crate) fn stamps_to_repeat(&self, position: [i32; 3]) -> usize {
+        match self.edited.get(&position) {
+            Some(Edits::Stamps(stamps)) => stamps.len(),
+            _ => 0,
+        }
+    }
+
     /// Whether a chunk is known to have no surface.
     pub(crate) fn is_without_surface(&self, key: ChunkKey) -> bool {
         let ChunkKey { level, position } = key;
