@@ -271,22 +271,28 @@ impl Start<'_, '_, '_> {
             volume.pending.push(Pending { chunks: group.chunks, look_the_same, since });
             return;
         }
-        let mut jobs = Vec::new();
-        for key in &group.chunks {
-            let is_member = |state: &&ChunkState| state.wanted == Wanted::Mesh && !state.hidden && state.missing == 0;
-            let Some(state) = volume.chunks.get(key).filter(is_member) else { continue };
-            let stays = state.drawn && !state.stale && look_the_same.contains(key);
-            for neighbour in key.around() {
-                let is_shown_as_it_is = |chunk| {
-                    let is_drawn = volume.chunks.get(&neighbour).is_some_and(|state| state.drawn);
-                    is_drawn && !group.chunks.contains(&neighbour)
-                        || volume.shown.chunk(neighbour.position).is_some_and(|shown| same_samples(shown, chunk))
-                };
-                if let Some(chunk) = volume.grid.chunk(neighbour.position).filter(|chunk| !is_shown_as_it_is(*chunk)) {
-                    group.snapshot.entry(neighbour.position).or_insert_with(|| chunk.clone());
-                }
+        let is_member = |key: &ChunkKey| {
+            let is_wanted = |state: &ChunkState| state.wanted == Wanted::Mesh && !state.hidden && state.missing == 0;
+            volume.chunks.get(key).is_some_and(is_wanted)
+        };
+        let members: Vec<ChunkKey> = group.chunks.iter().copied().filter(is_member).collect();
+        let mut near: Vec<ChunkKey> = members.iter().copied().flat_map(ChunkKey::around).collect();
+        near.sort_unstable();
+        near.dedup();
+        for key in near {
+            let is_shown_as_it_is = |chunk| {
+                let is_drawn = volume.chunks.get(&key).is_some_and(|state| state.drawn);
+                is_drawn && !group.chunks.contains(&key)
+                    || volume.shown.chunk(key.position).is_some_and(|shown| same_samples(shown, chunk))
+            };
+            if let Some(chunk) = volume.grid.chunk(key.position).filter(|chunk| !is_shown_as_it_is(*chunk)) {
+                group.snapshot.insert(key.position, chunk.clone());
             }
-            if stays {
+        }
+        let mut jobs = Vec::new();
+        for key in members {
+            let is_drawn = volume.chunks.get(&key).is_some_and(|state| state.drawn && !state.stale);
+            if is_drawn && look_the_same.contains(&key) {
                 continue;
             }
             group.members += 1;
