@@ -151,8 +151,10 @@ impl Table {
     /// All chunks, row by row: y, z, and which x; some rows are empty.
     fn rows(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
         let [first_y, first_z] = self.from;
-        (first_z..).zip(&self.z).flat_map(move |(z, &z_square)| {
-            (first_y..).zip(&self.y).map(move |(y, &y_square)| (y, z, self.grown.row_at(y_square, z_square)))
+        // Counted from 0: the last row may be the last that there is a number for.
+        (0..).zip(&self.z).flat_map(move |(z, &z_square)| {
+            let row = move |(y, &y_square)| (first_y + y, first_z + z, self.grown.row_at(y_square, z_square));
+            (0..).zip(&self.y).map(row)
         })
     }
 
