@@ -50,9 +50,15 @@ impl Ray {
 
     /// No fewer than [`walk`](Self::walk) goes through.
     pub(super) fn steps(&self, region: Region, size: i64) -> f64 {
-        let length = self.span(region, size).map(|(start, end)| (end - start) / size as f64);
+        let Some((start, end)) = self.span(region, size) else { return 0.0 };
+        let passed = |axis: usize| {
+            let along = self.direction[axis].abs();
+            // From very far away, many planes are reached at what is the same number.
+            let rounding = 4.0 * f64::EPSILON * (self.origin[axis].abs() + along * end);
+            (along * (end - start) + rounding) / size as f64
+        };
         // One more than planes are passed, of which each axis may have one more than the length has sizes.
-        length.map_or(0.0, |length| self.direction.iter().map(|along| along.abs() * length).sum::<f64>() + 4.0)
+        (0..3).map(passed).sum::<f64>() + 4.0
     }
 
     /// The cells of `region` that the ray passes, in order.

@@ -208,6 +208,21 @@ proptest! {
     }
 }
 
+/// From there, all planes are reached at the same distance: a walk past all of them would not end in this life.
+#[test]
+fn rays_from_beyond_all_precision_come_to_an_end() {
+    for far in [1e18, 1e40, 1e300] {
+        let origin = [far, 0.5, 0.5];
+        assert!(
+            ray_cast(&grid(1, false), 0.0, origin, [-1.0, 0.0, 0.0], f64::INFINITY)
+                .is_none_or(|hit| hit.distance > 0.0)
+        );
+        let ray = Ray::new(origin, [-1.0, 0.0, 0.0], f64::INFINITY).unwrap();
+        let region = Region::new([-100, 0, 0], [100, 1, 1]);
+        assert!(ray.walk(region, 8).count() as f64 <= ray.steps(region, 8));
+    }
+}
+
 #[test]
 fn both_sides_are_hit_and_the_normal_points_out() {
     let mut grid = Grid::<i16>::new(16).unwrap();
