@@ -9,6 +9,7 @@
 
 mod handmade;
 mod job;
+mod spare;
 
 use core::time::Duration;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,11 +21,12 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
 use bevy_platform::time::Instant;
-use marchless::{Chunk, Grid, MeshBuffer};
+use marchless::{Chunk, Grid, MeshBuffer, Region};
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
 pub(crate) use job::{Colors, Meshed};
-use job::{MeshJob, mesh_now};
+use job::{mesh_chunk, mesh_now};
+use spare::SpareMeshes;
 
 use crate::chunk::{ChunkGeometry, ChunkKey, mesh_bounds, new_chunk};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
@@ -45,6 +47,7 @@ impl Plugin for MeshingPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<MeshResults>()
             .init_resource::<handmade::HandmadeResults>()
+            .init_resource::<SpareMeshes>()
             .register_type::<ChunkSamples>()
             .register_type::<NoAutoAabb>()
             .add_observer(handmade::forget_removed_samples)
@@ -67,6 +70,8 @@ struct MeshResult {
 struct Screen<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
+    geometries: Query<'w, 's, &'static ChunkGeometry>,
+    spare: Res<'w, SpareMeshes>,
     stats: ResMut<'w, Stats>,
     stream: ResMut<'w, StreamStats>,
 }
@@ -74,12 +79,15 @@ struct Screen<'w, 's> {
 impl Screen<'_, '_> {
     /// Gives an entity its new mesh, which may be empty. `cells`: the chunk's size, whose box bounds an empty mesh.
     fn show(&mut self, entity: Entity, meshed: Meshed, cells: [u32; 3]) {
+        if let Ok(replaced) = self.geometries.get(entity) {
+            self.spare.keep(replaced.mesh.clone());
+        }
         let bounds = mesh_bounds(&meshed.geometry, cells);
         let mut entity = self.commands.entity(entity);
-        entity.try_insert((ChunkGeometry { mesh: meshed.geometry }, bounds));
+        let shown = (ChunkGeometry { mesh: meshed.geometry }, bounds);
         match (&mut self.assets, meshed.mesh) {
-            (Some(assets), Some(mesh)) => entity.try_insert(Mesh3d(assets.add(mesh))),
-            _ => entity.try_remove::<Mesh3d>(),
+            (Some(assets), Some(mesh)) => entity.try_insert((shown, Mesh3d(assets.add(mesh)))),
+            _ => entity.try_insert(shown).try_remove::<Mesh3d>(),
         };
     }
 
@@ -150,7 +158,7 @@ fn mesh_terrains(
 
 /// Whether a chunk and all around it are certainly of one kind: that is asked without touching shared samples.
 fn is_uniform_around(grid: &Grid<i16>, position: [i32; 3]) -> bool {
-    !matches!(grid.chunk(position), Some(Chunk::Samples(_))) && grid.neighbourhood(position).is_uniform()
+    !matches!(grid.chunk(position), Some(Chunk::Samples(_))) && grid.neighbourhood_view(position).is_uniform()
 }
 
 /// How many bytes a mesh takes, in memory and, or about so, on the graphics card.
@@ -245,7 +253,7 @@ impl Start<'_, '_, '_> {
     fn group(&mut self, volume: &mut TerrainVolume, pending: Pending, priority: Priority) {
         let Pending { chunks, look_the_same, since } = pending;
         let Some(terrain) = &volume.settings else { return };
-        let (settings, colors) = (terrain.mesh_settings(), volume.colors.clone());
+        let settings = terrain.mesh_settings();
         let mut group = Group {
             chunks,
             snapshot: BTreeMap::new(),
@@ -276,39 +284,38 @@ impl Start<'_, '_, '_> {
             volume.chunks.get(key).is_some_and(is_wanted)
         };
         let members: Vec<ChunkKey> = group.chunks.iter().copied().filter(is_member).collect();
-        let mut near: Vec<ChunkKey> = members.iter().copied().flat_map(ChunkKey::around).collect();
-        near.sort_unstable();
-        near.dedup();
-        for key in near {
-            let is_shown_as_it_is = |chunk| {
-                let is_drawn = volume.chunks.get(&key).is_some_and(|state| state.drawn);
-                is_drawn && !group.chunks.contains(&key)
-                    || volume.shown.chunk(key.position).is_some_and(|shown| same_samples(shown, chunk))
-            };
-            if let Some(chunk) = volume.grid.chunk(key.position).filter(|chunk| !is_shown_as_it_is(*chunk)) {
-                group.snapshot.insert(key.position, chunk.clone());
+        for member in &members {
+            let around = Region::new(member.position, member.position).grown(1, 2);
+            let mut shown = volume.shown.chunks_in(around).peekable();
+            for (position, chunk) in volume.grid.chunks_in(around) {
+                while shown.next_if(|(before, _)| *before < position).is_some() {}
+                let is_shown = shown.peek().is_some_and(|shown| shown.0 == position && same_samples(shown.1, chunk));
+                let key = ChunkKey::finest(position);
+                let is_drawn = || volume.chunks.get(&key).is_some_and(|state| state.drawn);
+                if !is_shown && (group.chunks.contains(&key) || !is_drawn()) {
+                    group.snapshot.entry(position).or_insert_with(|| chunk.clone());
+                }
             }
         }
-        let mut jobs = Vec::new();
+        let mut to_mesh = Vec::new();
         for key in members {
             let is_drawn = volume.chunks.get(&key).is_some_and(|state| state.drawn && !state.stale);
             if is_drawn && look_the_same.contains(&key) {
                 continue;
             }
             group.members += 1;
-            let samples = volume.grid.neighbourhood(key.position);
-            if samples.is_uniform() {
+            if volume.grid.neighbourhood_view(key.position).is_uniform() {
                 group.meshed.push(Meshed::empty(key.position));
             } else {
-                let colors = self.screen.assets.is_some().then(|| colors.clone());
-                jobs.push(MeshJob { position: key.position, samples, settings, colors });
+                to_mesh.push(key.position);
             }
         }
         if group.members == 0 && group.snapshot.is_empty() {
             return;
         }
-        if jobs.len() <= self.inline {
-            for meshed in mesh_now(jobs) {
+        let colors = self.screen.assets.is_some().then(|| volume.colors.clone());
+        if to_mesh.len() <= self.inline {
+            for meshed in mesh_now(&volume.grid, &to_mesh, &settings, colors.as_ref(), &self.screen.spare) {
                 self.screen.count_mesh(meshed.time);
                 group.meshed.push(meshed);
             }
@@ -317,9 +324,13 @@ impl Start<'_, '_, '_> {
         }
         let id = volume.claim(&group.chunks);
         volume.first_meshes += usize::from(group.withdrawable);
-        for job in jobs {
-            let (terrain, results) = (self.terrain, self.results.0.clone());
-            let run = move || results.push(MeshResult { terrain, group: id, meshed: job.run() });
+        for position in to_mesh {
+            let (terrain, results, colors) = (self.terrain, self.results.0.clone(), colors.clone());
+            let samples = volume.grid.neighbourhood(position);
+            let run = move || {
+                let meshed = mesh_chunk(&samples.view(), position, &settings, colors.as_ref(), None);
+                results.push(MeshResult { terrain, group: id, meshed });
+            };
             group.tickets.push(self.queue.push(priority, run));
         }
         volume.groups.insert(id, group);

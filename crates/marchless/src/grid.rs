@@ -12,7 +12,7 @@ use alloc::collections::{BTreeMap, BTreeSet};
 
 use thiserror::Error;
 
-pub use self::block::{Block, Neighbourhood};
+pub use self::block::{Block, Neighbourhood, NeighbourhoodView};
 use self::border::Border;
 pub use self::chunk::{Chunk, ChunkSamples};
 pub use self::spare::SpareSamples;
@@ -155,9 +155,9 @@ impl<W: Weight> Grid<W> {
     pub fn load(&mut self, position: [i32; 3], mut chunk: Chunk<W>) -> Result<(), GridError> {
         chunk.check(self.cells)?;
         self.check(position)?;
-        let origin = self.chunk_region(position).min;
-        if let Some(border) = self.border() {
-            chunk.clip(origin, self.cells, &border);
+        let region = self.chunk_region(position);
+        if let Some(border) = self.border().filter(|border| border.reaches(&region)) {
+            chunk.clip(region.min, self.cells, &border);
         }
         self.chunks.insert(position, chunk);
         Ok(())
@@ -205,6 +205,14 @@ impl<W: Weight> Grid<W> {
         self.chunks.range(position..).map(|(position, chunk)| (*position, chunk))
     }
 
+    /// The chunks at the positions of a box, in order; searches once for each of its columns along z.
+    pub fn chunks_in(&self, positions: Region) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+        let Region { min, max } = positions;
+        let columns = (min[0]..max[0]).flat_map(move |x| (min[1]..max[1]).map(move |y| [x, y]));
+        let column = move |[x, y]: [i32; 2]| self.chunks.range([x, y, min[2]]..[x, y, max[2].max(min[2])]);
+        columns.flat_map(column).map(|(position, chunk)| (*position, chunk))
+    }
+
     /// Takes the chunk at `position` out, so that it reads as air, and marks it and its neighbours dirty.
     pub fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
         let chunk = self.chunks.remove(&position)?;
@@ -214,25 +222,32 @@ impl<W: Weight> Grid<W> {
 
     /// The chunk at `position` with its neighbours, as they are now: what a task needs to mesh it.
     pub fn neighbourhood(&self, position: [i32; 3]) -> Neighbourhood<W> {
+        self.neighbourhood_view(position).to_neighbourhood()
+    }
+
+    /// The chunk at `position` with its neighbours, in place: what meshing it at once needs.
+    pub fn neighbourhood_view(&self, position: [i32; 3]) -> NeighbourhoodView<'_, W> {
         let limits = self.limits();
         let step = |index: usize| [index % 3, index / 3 % 3, index / 9];
-        let mut chunks = core::array::from_fn(|index| {
-            let neighbour = [0, 1, 2].map(|axis| i64::from(position[axis]) + step(index)[axis] as i64 - 1);
+        let is_beyond = |index: &usize| {
+            let neighbour = [0, 1, 2].map(|axis| i64::from(position[axis]) + step(*index)[axis] as i64 - 1);
             let is_within = |axis: usize| (limits.min[axis].into()..limits.max[axis].into()).contains(&neighbour[axis]);
-            (0..3).all(is_within).then_some(Chunk::AIR)
-        });
+            !(0..3).all(is_within)
+        };
+        let beyond = (0..27).filter(is_beyond).fold(0, |beyond, index| beyond | 1 << index);
+        let mut chunks = [None; 27];
         // Three at a time, since those above each other along z follow each other in the map.
         let around = position.map(|v| [v.saturating_sub(1), v, v.saturating_add(1)]);
         for (j, y) in around[1].into_iter().enumerate() {
             for (i, x) in around[0].into_iter().enumerate() {
                 for (&neighbour, chunk) in self.chunks.range([x, y, around[2][0]]..=[x, y, around[2][2]]) {
                     let k = (neighbour[2] - around[2][0]) as usize;
-                    chunks[i + 3 * (j + 3 * k)] = Some(chunk.clone());
+                    chunks[i + 3 * (j + 3 * k)] = Some(chunk);
                 }
             }
         }
         let origin = position.map(|v| i64::from(v) * i64::from(self.cells));
-        Neighbourhood { chunks, cells: self.cells, origin, border: self.border() }
+        NeighbourhoodView { chunks, beyond, cells: self.cells, origin, border: self.border() }
     }
 
     /// The chunk positions whose block (one point below, two above) reads a point of `changed`, within the bounds.
@@ -278,7 +293,7 @@ impl<W: Weight> Grid<W> {
     }
 
     /// Meshes the chunk at `position`, in cells from its lowest lattice point. Many chunks are meshed faster by
-    /// [`Neighbourhood::mesh`], which reuses its block.
+    /// [`NeighbourhoodView::mesh`], which reuses its block.
     ///
     /// # Errors
     /// As [`Mesher::mesh`]; `out` is then empty.
@@ -289,7 +304,7 @@ impl<W: Weight> Grid<W> {
         settings: &MeshSettings,
         out: &mut MeshBuffer,
     ) -> Result<(), MeshError> {
-        self.neighbourhood(position).mesh(mesher, &mut Block::new(), settings, out)
+        self.neighbourhood_view(position).mesh(mesher, &mut Block::new(), settings, out)
     }
 
     /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who clips it to the

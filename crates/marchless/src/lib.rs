@@ -50,7 +50,7 @@
 //!   machine.
 //! - No samples, stamps, rays or meshes panic: NaN and infinite samples have a meaning ([`Weight`]), and what cannot be
 //!   meshed is a typed error. (Constructors of a cell's parts say when they do.)
-//! - [`Mesher::mesh`] and [`Neighbourhood::mesh`] allocate nothing once their buffers are warm.
+//! - [`Mesher::mesh`] and [`NeighbourhoodView::mesh`] allocate nothing once their buffers are warm.
 //!
 //! # Not guaranteed
 //! - That no triangles of [`Topology::Trilinear`] cross: none did in tens of millions of random cells, of weights of all
@@ -112,7 +112,7 @@ pub use buffer::MeshBuffer;
 pub use cell::{CaseIndex, Corner, Edge, Face};
 pub use grid::{
     Block, Chunk, ChunkSamples, DEFAULT_CHUNK_CELLS, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, Neighbourhood,
-    SpareSamples,
+    NeighbourhoodView, SpareSamples,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 #[cfg(feature = "std")]

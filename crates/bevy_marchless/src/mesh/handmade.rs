@@ -124,7 +124,7 @@ impl ChunkSamples {
             let samples = Samples::new(data.shape, &data.weights)
                 .and_then(|samples| samples.with_materials(materials))
                 .expect("the lengths have been checked");
-            mesh_with([0; 3], colors.as_ref(), |mesher, _, out| mesher.mesh(samples, &settings, out))
+            mesh_with([0; 3], colors.as_ref(), None, |mesher, _, out| mesher.mesh(samples, &settings, out))
         }
     }
 }

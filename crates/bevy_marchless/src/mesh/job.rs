@@ -1,4 +1,4 @@
-//! [`MeshJob`]: meshing one chunk, on any thread.
+//! Meshing chunks, on any thread.
 
 use core::cell::RefCell;
 use core::time::Duration;
@@ -9,9 +9,10 @@ use bevy_math::bounding::Aabb3d;
 use bevy_mesh::{Indices, Mesh, PrimitiveTopology};
 use bevy_platform::time::Instant;
 use bevy_tasks::ComputeTaskPool;
-use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, Neighbourhood};
+use marchless::{Block, Grid, MeshBuffer, MeshError, MeshSettings, Mesher, NeighbourhoodView};
 
 use super::ATTRIBUTE_MATERIAL;
+use super::spare::SpareMeshes;
 
 /// The linear colours of all materials.
 pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
@@ -33,20 +34,34 @@ impl Meshed {
     }
 }
 
-/// A chunk to be meshed.
-pub(crate) struct MeshJob {
-    pub(crate) position: [i32; 3],
-    pub(crate) samples: Neighbourhood<i16>,
-    pub(crate) settings: MeshSettings,
-    /// The colours of its vertices; `None` where no asset is wanted.
-    pub(crate) colors: Option<Colors>,
+/// Meshes a chunk. `colors`: of its vertices; `None` where no asset is wanted. `spare`: memory for the mesh; without it,
+/// the mesh takes no more than it needs.
+pub(crate) fn mesh_chunk(
+    samples: &NeighbourhoodView<'_>,
+    position: [i32; 3],
+    settings: &MeshSettings,
+    colors: Option<&Colors>,
+    spare: Option<&SpareMeshes>,
+) -> Meshed {
+    mesh_with(position, colors, spare, |mesher, block, out| samples.mesh(mesher, block, settings, out))
 }
 
-impl MeshJob {
-    pub(crate) fn run(self) -> Meshed {
-        mesh_with(self.position, self.colors.as_ref(), |mesher, block, out| {
-            self.samples.mesh(mesher, block, &self.settings, out)
-        })
+/// Meshes chunks at once, on the compute pool where there is one.
+pub(crate) fn mesh_now(
+    grid: &Grid,
+    positions: &[[i32; 3]],
+    settings: &MeshSettings,
+    colors: Option<&Colors>,
+    spare: &SpareMeshes,
+) -> Vec<Meshed> {
+    let mesh = |position| mesh_chunk(&grid.neighbourhood_view(position), position, settings, colors, Some(spare));
+    match ComputeTaskPool::try_get() {
+        Some(pool) if positions.len() > 1 => pool.scope(|scope| {
+            for &position in positions {
+                scope.spawn(async move { mesh(position) });
+            }
+        }),
+        _ => positions.iter().copied().map(mesh).collect(),
     }
 }
 
@@ -55,6 +70,7 @@ impl MeshJob {
 pub(super) fn mesh_with(
     position: [i32; 3],
     colors: Option<&Colors>,
+    spare: Option<&SpareMeshes>,
     mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
 ) -> Meshed {
     thread_local! {
@@ -64,26 +80,14 @@ pub(super) fn mesh_with(
     let start = Instant::now();
     // A copy takes no more memory than the mesh needs; a buffer that has grown does.
     let geometry = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
-        Ok(()) => geometry.clone(),
+        Ok(()) => spare.map_or_else(|| Arc::new(geometry.clone()), |spare| spare.copy(geometry)),
         Err(error) => {
             bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
-            MeshBuffer::new()
+            Arc::default()
         }
     });
     let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors));
-    Meshed { position, geometry: Arc::new(geometry), mesh, time: start.elapsed() }
-}
-
-/// Runs jobs at once, on the compute pool where there is one.
-pub(crate) fn mesh_now(mut jobs: Vec<MeshJob>) -> Vec<Meshed> {
-    match ComputeTaskPool::try_get() {
-        Some(pool) if jobs.len() > 1 => pool.scope(|scope| {
-            for job in jobs.drain(..) {
-                scope.spawn(async move { job.run() });
-            }
-        }),
-        _ => jobs.into_iter().map(MeshJob::run).collect(),
-    }
+    Meshed { position, geometry, mesh, time: start.elapsed() }
 }
 
 /// The indices, in half the bytes where there are few enough vertices.

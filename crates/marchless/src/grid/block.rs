@@ -1,10 +1,12 @@
-//! [`Neighbourhood`]: a snapshot of a chunk and its 26 neighbours; [`Block`]: the samples its mesh is made from.
+//! [`NeighbourhoodView`]: a chunk and its 26 neighbours; [`Neighbourhood`]: a snapshot of them; [`Block`]: the samples
+//! its mesh is made from.
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::array;
 
-use super::Chunk;
 use super::border::{Border, larger, layer_indices};
+use super::{Chunk, DEFAULT_CHUNK_CELLS, MAX_CHUNK_CELLS};
 use crate::buffer::MeshBuffer;
 use crate::lattice::{Samples, Shape};
 use crate::mesher::{MeshError, MeshSettings, Mesher};
@@ -14,8 +16,10 @@ use crate::sample::{Voxel, Weight};
 /// sent to another thread.
 #[derive(Clone, Debug)]
 pub struct Neighbourhood<W = i16> {
-    /// x fastest, the chunk itself in the middle; `None` beyond the bounds.
+    /// x fastest, the chunk itself in the middle; `None` where there is none.
     pub(super) chunks: [Option<Chunk<W>>; 27],
+    /// A bit for each of them: whether it lies beyond the bounds. Within, what is not there is air.
+    pub(super) beyond: u32,
     pub(super) cells: u32,
     /// The middle chunk's lowest lattice point.
     pub(super) origin: [i64; 3],
@@ -27,17 +31,69 @@ pub struct Neighbourhood<W = i16> {
 const CENTRE: usize = 13;
 
 impl<W: Weight> Neighbourhood<W> {
+    /// The same, borrowed.
+    pub fn view(&self) -> NeighbourhoodView<'_, W> {
+        let Self { ref chunks, beyond, cells, origin, border } = *self;
+        NeighbourhoodView { chunks: chunks.each_ref().map(Option::as_ref), beyond, cells, origin, border }
+    }
+
+    /// [`NeighbourhoodView::is_uniform`].
+    pub fn is_uniform(&self) -> bool {
+        self.view().is_uniform()
+    }
+
+    /// [`NeighbourhoodView::block`].
+    pub fn block(&self, out: &mut Block<W>) {
+        self.view().block(out);
+    }
+
+    /// [`NeighbourhoodView::mesh`].
+    ///
+    /// # Errors
+    /// As [`Mesher::mesh`]; `out` is then empty.
+    pub fn mesh(
+        &self,
+        mesher: &mut Mesher,
+        block: &mut Block<W>,
+        settings: &MeshSettings,
+        out: &mut MeshBuffer,
+    ) -> Result<(), MeshError> {
+        self.view().mesh(mesher, block, settings, out)
+    }
+}
+
+/// A chunk and its 26 neighbours in their [`Grid`](super::Grid): all that its mesh depends on, to be meshed here and now.
+#[derive(Clone, Copy, Debug)]
+pub struct NeighbourhoodView<'a, W = i16> {
+    /// As in [`Neighbourhood`].
+    pub(super) chunks: [Option<&'a Chunk<W>>; 27],
+    pub(super) beyond: u32,
+    pub(super) cells: u32,
+    pub(super) origin: [i64; 3],
+    pub(super) border: Option<Border>,
+}
+
+impl<W: Weight> NeighbourhoodView<'_, W> {
+    /// A snapshot, which later edits leave as it is.
+    pub fn to_neighbourhood(&self) -> Neighbourhood<W> {
+        let Self { chunks, beyond, cells, origin, border } = *self;
+        Neighbourhood { chunks: chunks.map(Option::<&_>::cloned), beyond, cells, origin, border }
+    }
+
     /// Whether it is certain, without looking at single samples, that the chunk has no surface: it lies beyond the
     /// bounds, or all that its mesh reads is one weight (at the border of a bounded grid, the one farthest outside).
     pub fn is_uniform(&self) -> bool {
-        let Some(Chunk::Uniform(first)) = &self.chunks[CENTRE] else {
-            return self.chunks[CENTRE].is_none();
+        let weight = |chunk: Option<&Chunk<W>>| match chunk {
+            Some(Chunk::Uniform(voxel)) => Some(voxel.weight),
+            Some(Chunk::Samples(_)) => None,
+            None => Some(W::OUTSIDE),
         };
-        self.chunks.iter().all(|chunk| match chunk {
-            Some(Chunk::Uniform(voxel)) => voxel.weight == first.weight,
-            Some(Chunk::Samples(_)) => false,
-            None => first.weight == W::OUTSIDE,
-        })
+        let first = weight(self.chunks[CENTRE]);
+        self.is_beyond(CENTRE) || first.is_some() && self.chunks.iter().all(|chunk| weight(*chunk) == first)
+    }
+
+    const fn is_beyond(&self, index: usize) -> bool {
+        self.beyond >> index & 1 == 1
     }
 
     /// Gathers the samples that the chunk's mesh is made from: its own, one layer below and two above.
@@ -48,24 +104,34 @@ impl<W: Weight> Neighbourhood<W> {
         // Where each of three neighbours along an axis lies in the block, from which of its samples on, and how many.
         let spans =
             [Span { to: 0, from: n - 1, len: 1 }, Span { to: 1, from: 0, len: n }, Span { to: n + 1, from: 0, len: 2 }];
-        for (index, chunk) in self.chunks.iter().enumerate() {
-            let spans = [spans[index % 3], spans[index / 3 % 3], spans[index / 9]];
-            match chunk {
-                Some(Chunk::Samples(samples)) => {
-                    copy(&mut out.weights, &samples.weights, n, spans);
-                    copy(&mut out.materials, &samples.materials, n, spans);
+        // Every row is read from three chunks at once: most of the time goes into waiting for memory.
+        for (line, chunks) in self.chunks.as_chunks::<3>().0.iter().enumerate() {
+            let [y, z] = [spans[line % 3], spans[line / 3]];
+            let uniform = chunks.map(|chunk| if let Some(Chunk::Uniform(voxel)) = chunk { *voxel } else { Voxel::AIR });
+            let weights = uniform.map(|voxel| [voxel.weight; MAX_CHUNK_CELLS as usize]);
+            let materials = uniform.map(|voxel| [voxel.material; MAX_CHUNK_CELLS as usize]);
+            let samples =
+                chunks.map(|chunk| if let Some(Chunk::Samples(samples)) = chunk { Some(samples) } else { None });
+            let weights = array::from_fn(|i| samples[i].map_or(&weights[i][..], |samples| &samples.weights));
+            let materials = array::from_fn(|i| samples[i].map_or(&materials[i][..], |samples| &samples.materials));
+            let strides = samples.map(|samples| usize::from(samples.is_some()));
+            for k in 0..z.len {
+                for j in 0..y.len {
+                    let to = (n + 3) * (y.to + j + (n + 3) * (z.to + k));
+                    let from = strides.map(|stride| stride * n * (y.from + j + n * (z.from + k)));
+                    join(&mut out.weights[to..][..n + 3], weights, from);
+                    join(&mut out.materials[to..][..n + 3], materials, from);
                 }
-                Some(Chunk::Uniform(voxel)) => out.rows(spans, |_, weights, materials| {
-                    weights.fill(voxel.weight);
-                    materials.fill(voxel.material);
-                }),
-                None => out.rows(spans, |[x, y, z], weights, materials| {
-                    for (i, (weight, material)) in weights.iter_mut().zip(materials).enumerate() {
-                        let voxel = self.beyond([x + i, y, z]);
-                        (*weight, *material) = (voxel.weight, voxel.material);
-                    }
-                }),
             }
+        }
+        for index in (0..27).filter(|index| self.is_beyond(*index)) {
+            let spans = [spans[index % 3], spans[index / 3 % 3], spans[index / 9]];
+            out.rows(spans, |[x, y, z], weights, materials| {
+                for (i, (weight, material)) in weights.iter_mut().zip(materials).enumerate() {
+                    let voxel = self.beyond([x + i, y, z]);
+                    (*weight, *material) = (voxel.weight, voxel.material);
+                }
+            });
         }
     }
 
@@ -168,18 +234,16 @@ struct Span {
     len: usize,
 }
 
-/// Copies a box out of the cube `source` of `n` samples per axis into the cube `target` of `n + 3` samples per axis.
-fn copy<T: Copy>(target: &mut [T], source: &[T], n: usize, [x, y, z]: [Span; 3]) {
-    for k in 0..z.len {
-        for j in 0..y.len {
-            let to = x.to + (n + 3) * (y.to + j + (n + 3) * (z.to + k));
-            let from = x.from + n * (y.from + j + n * (z.from + k));
-            // Calling out to copy one or two samples, as most rows are, would cost more than all the long rows.
-            match x.len {
-                1 => target[to] = source[from],
-                2 => (target[to], target[to + 1]) = (source[from], source[from + 1]),
-                len => target[to..to + len].copy_from_slice(&source[from..from + len]),
-            }
-        }
+/// Joins a row of three chunks: the last sample of the first, all of the second, two of the third.
+fn join<T: Copy>(row: &mut [T], [before, own, after]: [&[T]; 3], from: [usize; 3]) {
+    let n = row.len() - 3;
+    row[0] = before[from[0] + n - 1];
+    let own = &own[from[1]..][..n];
+    match own.as_array::<{ DEFAULT_CHUNK_CELLS as usize }>() {
+        // Known to the compiler, the usual length needs no call.
+        Some(own) => *row[1..].first_chunk_mut().expect("three longer") = *own,
+        None => row[1..=n].copy_from_slice(own),
     }
+    row[n + 1] = after[from[2]];
+    row[n + 2] = after[from[2] + 1];
 }
