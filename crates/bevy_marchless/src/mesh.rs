@@ -315,7 +315,10 @@ impl Start<'_, '_, '_> {
         }
         let colors = self.screen.assets.is_some().then(|| volume.colors.clone());
         if to_mesh.len() <= self.inline {
-            for meshed in mesh_now(&volume.grid, &to_mesh, &settings, colors.as_ref(), &self.screen.spare) {
+            let meshed = mesh_now(&volume.grid, &to_mesh, &settings, colors.as_ref(), &self.screen.spare);
+            let has_asset = |meshed: &&Meshed| meshed.mesh.is_some();
+            self.screen.spare.prepare_rooms(meshed.iter().filter(has_asset).map(|meshed| &*meshed.geometry));
+            for meshed in meshed {
                 self.screen.count_mesh(meshed.time);
                 group.meshed.push(meshed);
             }

@@ -12,7 +12,7 @@ use bevy_tasks::ComputeTaskPool;
 use marchless::{Block, Grid, MeshBuffer, MeshError, MeshSettings, Mesher, NeighbourhoodView};
 
 use super::ATTRIBUTE_MATERIAL;
-use super::spare::SpareMeshes;
+use super::spare::{AssetRoom, SpareMeshes};
 
 /// The linear colours of all materials.
 pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
@@ -86,33 +86,38 @@ pub(super) fn mesh_with(
             Arc::default()
         }
     });
-    let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors));
+    let room = || spare.map_or_else(AssetRoom::default, |spare| spare.room_for(&geometry));
+    let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors, room()));
     Meshed { position, geometry, mesh, time: start.elapsed() }
 }
 
-/// The indices, in half the bytes where there are few enough vertices.
-fn indices(geometry: &MeshBuffer) -> Indices {
-    if geometry.positions.len() <= usize::from(u16::MAX) {
-        Indices::U16(geometry.indices.iter().map(|&index| index as u16).collect())
+/// A mesh for the render world: positions in voxels, colours and materials a vertex, and the indices, in half the bytes
+/// where there are few enough vertices.
+fn to_asset(geometry: &MeshBuffer, colors: &Colors, room: AssetRoom) -> Mesh {
+    let MeshBuffer { positions, normals, materials, indices, bounds } = geometry;
+    let indices = if positions.len() <= usize::from(u16::MAX) {
+        Indices::U16(filled(room.indices, indices.iter().map(|&index| index as u16)))
     } else {
-        Indices::U32(geometry.indices.clone())
+        Indices::U32(indices.clone())
+    };
+    let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, filled(room.positions, positions.iter().copied()))
+        .with_inserted_indices(indices);
+    if !normals.is_empty() {
+        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, filled(room.normals, normals.iter().copied()));
     }
+    if !materials.is_empty() {
+        let vertex_colors = materials.iter().map(|&material| colors[usize::from(material)]);
+        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, filled(room.colors, vertex_colors));
+        mesh.insert_attribute(ATTRIBUTE_MATERIAL, filled(room.materials, materials.iter().copied().map(u32::from)));
+    }
+    mesh.final_aabb = bounds.map(|[min, max]| Aabb3d::from_min_max(min, max));
+    mesh
 }
 
-/// A mesh for the render world: positions in voxels, colours and materials a vertex.
-fn to_asset(geometry: &MeshBuffer, colors: &Colors) -> Mesh {
-    let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, geometry.positions.clone())
-        .with_inserted_indices(indices(geometry));
-    if !geometry.normals.is_empty() {
-        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, geometry.normals.clone());
-    }
-    let materials = || geometry.materials.iter().copied();
-    if !geometry.materials.is_empty() {
-        let vertex_colors: Vec<_> = materials().map(|material| colors[usize::from(material)]).collect();
-        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, vertex_colors);
-        mesh.insert_attribute(ATTRIBUTE_MATERIAL, materials().map(u32::from).collect::<Vec<_>>());
-    }
-    mesh.final_aabb = geometry.bounds.map(|[min, max]| Aabb3d::from_min_max(min, max));
-    mesh
+/// The items, in a room that is empty.
+fn filled<T>(mut room: Vec<T>, items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
+    room.reserve_exact(items.len());
+    room.extend(items);
+    room
 }
