@@ -9,7 +9,7 @@
 
 mod handmade;
 mod job;
-mod spare;
+mod rooms;
 
 use core::time::Duration;
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,12 +21,12 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
 use bevy_platform::time::Instant;
-use marchless::{Chunk, Grid, MeshBuffer, Region};
+use marchless::{Chunk, Grid, MeshBuffer};
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
 pub(crate) use job::{Colors, Meshed};
 use job::{mesh_chunk, mesh_now};
-use spare::SpareMeshes;
+use rooms::MeshRooms;
 
 use crate::chunk::{ChunkGeometry, ChunkKey, mesh_bounds, new_chunk};
 use crate::schedule::{MarchlessSettings, MarchlessSystems};
@@ -47,7 +47,7 @@ impl Plugin for MeshingPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<MeshResults>()
             .init_resource::<handmade::HandmadeResults>()
-            .init_resource::<SpareMeshes>()
+            .init_resource::<MeshRooms>()
             .register_type::<ChunkSamples>()
             .register_type::<NoAutoAabb>()
             .add_observer(handmade::forget_removed_samples)
@@ -70,8 +70,7 @@ struct MeshResult {
 struct Screen<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
-    geometries: Query<'w, 's, &'static ChunkGeometry>,
-    spare: Res<'w, SpareMeshes>,
+    rooms: Res<'w, MeshRooms>,
     stats: ResMut<'w, Stats>,
     stream: ResMut<'w, StreamStats>,
 }
@@ -79,9 +78,6 @@ struct Screen<'w, 's> {
 impl Screen<'_, '_> {
     /// Gives an entity its new mesh, which may be empty. `cells`: the chunk's size, whose box bounds an empty mesh.
     fn show(&mut self, entity: Entity, meshed: Meshed, cells: [u32; 3]) {
-        if let Ok(replaced) = self.geometries.get(entity) {
-            self.spare.keep(replaced.mesh.clone());
-        }
         let bounds = mesh_bounds(&meshed.geometry, cells);
         let mut entity = self.commands.entity(entity);
         let shown = (ChunkGeometry { mesh: meshed.geometry }, bounds);
@@ -284,30 +280,28 @@ impl Start<'_, '_, '_> {
             volume.chunks.get(key).is_some_and(is_wanted)
         };
         let members: Vec<ChunkKey> = group.chunks.iter().copied().filter(is_member).collect();
-        for member in &members {
-            let around = Region::new(member.position, member.position).grown(1, 2);
-            let mut shown = volume.shown.chunks_in(around).peekable();
-            for (position, chunk) in volume.grid.chunks_in(around) {
-                while shown.next_if(|(before, _)| *before < position).is_some() {}
-                let is_shown = shown.peek().is_some_and(|shown| shown.0 == position && same_samples(shown.1, chunk));
-                let key = ChunkKey::finest(position);
-                let is_drawn = || volume.chunks.get(&key).is_some_and(|state| state.drawn);
-                if !is_shown && (group.chunks.contains(&key) || !is_drawn()) {
-                    group.snapshot.entry(position).or_insert_with(|| chunk.clone());
-                }
-            }
-        }
         let mut to_mesh = Vec::new();
         for key in members {
+            let samples = volume.grid.neighbourhood_view(key.position);
+            let shown = volume.shown.neighbourhood_view(key.position);
+            for (near, (chunk, shown)) in key.around().zip(samples.chunks().iter().zip(shown.chunks())) {
+                let Some(chunk) = chunk.filter(|chunk| !shown.is_some_and(|shown| same_samples(shown, chunk))) else {
+                    continue;
+                };
+                let is_drawn = || volume.chunks.get(&near).is_some_and(|state| state.drawn);
+                if group.chunks.contains(&near) || !is_drawn() {
+                    group.snapshot.entry(near.position).or_insert_with(|| chunk.clone());
+                }
+            }
             let is_drawn = volume.chunks.get(&key).is_some_and(|state| state.drawn && !state.stale);
             if is_drawn && look_the_same.contains(&key) {
                 continue;
             }
             group.members += 1;
-            if volume.grid.neighbourhood_view(key.position).is_uniform() {
+            if samples.is_uniform() {
                 group.meshed.push(Meshed::empty(key.position));
             } else {
-                to_mesh.push(key.position);
+                to_mesh.push((key.position, samples));
             }
         }
         if group.members == 0 && group.snapshot.is_empty() {
@@ -315,9 +309,8 @@ impl Start<'_, '_, '_> {
         }
         let colors = self.screen.assets.is_some().then(|| volume.colors.clone());
         if to_mesh.len() <= self.inline {
-            let meshed = mesh_now(&volume.grid, &to_mesh, &settings, colors.as_ref(), &self.screen.spare);
-            let has_asset = |meshed: &&Meshed| meshed.mesh.is_some();
-            self.screen.spare.prepare_rooms(meshed.iter().filter(has_asset).map(|meshed| &*meshed.geometry));
+            let meshed = mesh_now(&to_mesh, &settings, colors.as_ref(), &self.screen.rooms);
+            self.screen.rooms.prepare(meshed.iter().map(|meshed| &*meshed.geometry), colors.is_some());
             for meshed in meshed {
                 self.screen.count_mesh(meshed.time);
                 group.meshed.push(meshed);
@@ -325,11 +318,12 @@ impl Start<'_, '_, '_> {
             show_group(self.terrain, volume, group, self.screen);
             return;
         }
+        let to_mesh: Vec<_> =
+            to_mesh.into_iter().map(|(position, samples)| (position, samples.to_neighbourhood())).collect();
         let id = volume.claim(&group.chunks);
         volume.first_meshes += usize::from(group.withdrawable);
-        for position in to_mesh {
+        for (position, samples) in to_mesh {
             let (terrain, results, colors) = (self.terrain, self.results.0.clone(), colors.clone());
-            let samples = volume.grid.neighbourhood(position);
             let run = move || {
                 let meshed = mesh_chunk(&samples.view(), position, &settings, colors.as_ref(), None);
                 results.push(MeshResult { terrain, group: id, meshed });
@@ -362,8 +356,7 @@ fn show_group(terrain: Entity, volume: &mut TerrainVolume, group: Group, screen:
         let Some(state) = volume.chunks.get(&key) else { continue };
         let is_new = || !volume.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk));
         if (group.chunks.contains(&key) || !state.drawn) && is_new() {
-            let replaced = volume.shown.unload(position);
-            replaced.into_iter().for_each(|replaced| volume.spare.keep(replaced));
+            volume.forget_shown(position);
             volume.shown.load(position, chunk).expect("a chunk of the same extent");
         }
     }

@@ -1,6 +1,8 @@
 //! Meshing chunks, on any thread.
 
 use core::cell::RefCell;
+use core::iter;
+use core::sync::atomic::{AtomicUsize, Ordering};
 use core::time::Duration;
 use std::sync::Arc;
 
@@ -9,10 +11,10 @@ use bevy_math::bounding::Aabb3d;
 use bevy_mesh::{Indices, Mesh, PrimitiveTopology};
 use bevy_platform::time::Instant;
 use bevy_tasks::ComputeTaskPool;
-use marchless::{Block, Grid, MeshBuffer, MeshError, MeshSettings, Mesher, NeighbourhoodView};
+use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, NeighbourhoodView};
 
 use super::ATTRIBUTE_MATERIAL;
-use super::spare::{AssetRoom, SpareMeshes};
+use super::rooms::{AssetRoom, MeshRoom, MeshRooms};
 
 /// The linear colours of all materials.
 pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
@@ -34,35 +36,44 @@ impl Meshed {
     }
 }
 
-/// Meshes a chunk. `colors`: of its vertices; `None` where no asset is wanted. `spare`: memory for the mesh; without it,
+/// Meshes a chunk. `colors`: of its vertices; `None` where no asset is wanted. `rooms`: memory for the mesh; without it,
 /// the mesh takes no more than it needs.
 pub(crate) fn mesh_chunk(
     samples: &NeighbourhoodView<'_>,
     position: [i32; 3],
     settings: &MeshSettings,
     colors: Option<&Colors>,
-    spare: Option<&SpareMeshes>,
+    rooms: Option<&MeshRooms>,
 ) -> Meshed {
-    mesh_with(position, colors, spare, |mesher, block, out| samples.mesh(mesher, block, settings, out))
+    mesh_with(position, colors, rooms, |mesher, block, out| samples.mesh(mesher, block, settings, out))
 }
 
-/// Meshes chunks at once, on the compute pool where there is one.
+/// Meshes chunks at once, with the help of the compute pool where there is one; the result is in the order of positions.
 pub(crate) fn mesh_now(
-    grid: &Grid,
-    positions: &[[i32; 3]],
+    chunks: &[([i32; 3], NeighbourhoodView<'_>)],
     settings: &MeshSettings,
     colors: Option<&Colors>,
-    spare: &SpareMeshes,
+    rooms: &MeshRooms,
 ) -> Vec<Meshed> {
-    let mesh = |position| mesh_chunk(&grid.neighbourhood_view(position), position, settings, colors, Some(spare));
-    match ComputeTaskPool::try_get() {
-        Some(pool) if positions.len() > 1 => pool.scope(|scope| {
-            for &position in positions {
-                scope.spawn(async move { mesh(position) });
-            }
-        }),
-        _ => positions.iter().copied().map(mesh).collect(),
-    }
+    let next = AtomicUsize::new(0);
+    // Each thread takes the next one when it is free: to wake others for each would take longer.
+    let take = || {
+        let (position, samples) = chunks.get(next.fetch_add(1, Ordering::Relaxed))?;
+        Some(mesh_chunk(samples, *position, settings, colors, Some(rooms)))
+    };
+    let Some(pool) = ComputeTaskPool::try_get().filter(|_| chunks.len() > 1) else {
+        return iter::from_fn(take).collect();
+    };
+    let mut meshed = Vec::with_capacity(chunks.len());
+    let helped = pool.scope(|scope| {
+        for _ in 0..pool.thread_num().min(chunks.len() - 1) {
+            scope.spawn(async { iter::from_fn(take).collect::<Vec<_>>() });
+        }
+        meshed.extend(iter::from_fn(take));
+    });
+    meshed.extend(helped.into_iter().flatten());
+    meshed.sort_by_key(|meshed| meshed.position);
+    meshed
 }
 
 /// Runs `mesh` with this thread's scratch memory, and makes an asset of what comes out. A failure is reported and
@@ -70,7 +81,7 @@ pub(crate) fn mesh_now(
 pub(super) fn mesh_with(
     position: [i32; 3],
     colors: Option<&Colors>,
-    spare: Option<&SpareMeshes>,
+    rooms: Option<&MeshRooms>,
     mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
 ) -> Meshed {
     thread_local! {
@@ -78,17 +89,31 @@ pub(super) fn mesh_with(
             RefCell::new((Mesher::new(), Block::new(), MeshBuffer::new()));
     }
     let start = Instant::now();
-    // A copy takes no more memory than the mesh needs; a buffer that has grown does.
-    let geometry = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
-        Ok(()) => spare.map_or_else(|| Arc::new(geometry.clone()), |spare| spare.copy(geometry)),
+    // A copy takes no more memory than the mesh needs, or than its room has; a buffer that has grown does.
+    let room = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
+        Ok(()) => {
+            let mut room = rooms.map_or_else(MeshRoom::default, |rooms| rooms.room_for(geometry));
+            copy(geometry, &mut room.geometry);
+            room
+        }
         Err(error) => {
             bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
-            Arc::default()
+            MeshRoom::default()
         }
     });
-    let room = || spare.map_or_else(AssetRoom::default, |spare| spare.room_for(&geometry));
-    let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors, room()));
+    let MeshRoom { geometry, asset } = room;
+    let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors, asset));
+    let geometry = Arc::new(geometry);
     Meshed { position, geometry, mesh, time: start.elapsed() }
+}
+
+fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {
+    let MeshBuffer { positions, normals, materials, indices, bounds } = from;
+    to.positions.clone_from(positions);
+    to.normals.clone_from(normals);
+    to.materials.clone_from(materials);
+    to.indices.clone_from(indices);
+    to.bounds = *bounds;
 }
 
 /// A mesh for the render world: positions in voxels, colours and materials a vertex, and the indices, in half the bytes

@@ -359,7 +359,7 @@ impl Follow<'_, '_, '_> {
             }
             Fill::Dropped => {}
         }
-        self.volume.shown.unload(key.position);
+        self.volume.forget_shown(key.position);
     }
 
     /// Takes a chunk from the screen.
@@ -389,7 +389,7 @@ impl Follow<'_, '_, '_> {
             }
         } else if volume.may_drop(key) && volume.streaming.ranges.may_drop_samples(key.position) {
             volume.grid.unload(key.position);
-            volume.shown.unload(key.position);
+            volume.forget_shown(key.position);
             volume.bits.forget(key.position);
             if let Some(state) = volume.chunks.get_mut(&key) {
                 state.fill = Fill::Dropped;

@@ -377,6 +377,13 @@ impl TerrainVolume {
         }
     }
 
+    /// Forgets the samples with which a chunk is drawn.
+    pub(crate) fn forget_shown(&mut self, position: [i32; 3]) {
+        if let Some(samples) = self.shown.unload(position) {
+            self.spare.keep(samples);
+        }
+    }
+
     /// How many stamps are to be applied again when a chunk's samples come from its source.
     pub(crate) fn stamps_to_repeat(&self, position: [i32; 3]) -> usize {
         match self.edited.get(&position) {

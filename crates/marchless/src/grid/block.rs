@@ -73,7 +73,12 @@ pub struct NeighbourhoodView<'a, W = i16> {
     pub(super) border: Option<Border>,
 }
 
-impl<W: Weight> NeighbourhoodView<'_, W> {
+impl<'a, W: Weight> NeighbourhoodView<'a, W> {
+    /// The chunks, x fastest, each where there is one; the chunk itself is in the middle.
+    pub const fn chunks(&self) -> &[Option<&'a Chunk<W>>; 27] {
+        &self.chunks
+    }
+
     /// A snapshot, which later edits leave as it is.
     pub fn to_neighbourhood(&self) -> Neighbourhood<W> {
         let Self { chunks, beyond, cells, origin, border } = *self;

@@ -117,9 +117,7 @@ impl<W: Weight> Chunk<W> {
     /// The samples, to be changed: a uniform chunk is written out, a shared one copied.
     pub(crate) fn samples_mut(&mut self, cells: u32, spare: &mut SpareSamples<W>) -> &mut ChunkSamples<W> {
         if let Self::Uniform(voxel) = *self {
-            let len = (cells as usize).pow(3);
-            let (weights, materials) = (vec![voxel.weight; len], vec![voxel.material; len]);
-            *self = Self::Samples(Arc::new(ChunkSamples { weights, materials }));
+            *self = Self::Samples(spare.filled(voxel, (cells as usize).pow(3)));
         }
         match self {
             Self::Samples(samples) => spare.make_mut(samples),

@@ -1,11 +1,13 @@
 //! [`SpareSamples`]: memory for copies of samples that are to be changed.
 
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::{Chunk, ChunkSamples};
+use crate::sample::Voxel;
 
-/// The memory of samples that edits have replaced, for the copies that later edits begin with.
+/// The memory of samples that are no longer needed, for the samples that edits write out or copy before they change them.
 ///
 /// Where allocators give what is freed back to the thread that allocated it, as many do, copies of samples that came from
 /// other threads take new memory each time, and each page of it has to be mapped, which takes longer than copying.
@@ -33,6 +35,19 @@ impl<W> SpareSamples<W> {
 }
 
 impl<W: Clone> SpareSamples<W> {
+    /// Samples that are all alike.
+    pub(super) fn filled(&mut self, voxel: Voxel<W>, len: usize) -> Arc<ChunkSamples<W>> {
+        let Some(mut room) = self.0.pop() else {
+            return Arc::new(ChunkSamples { weights: vec![voxel.weight; len], materials: vec![voxel.material; len] });
+        };
+        let ChunkSamples { weights, materials } = Arc::make_mut(&mut room);
+        weights.clear();
+        weights.resize(len, voxel.weight);
+        materials.clear();
+        materials.resize(len, voxel.material);
+        room
+    }
+
     /// Makes samples the caller's own, to be changed: where clones of them are there, a copy takes their place.
     pub(super) fn make_mut<'a>(&mut self, samples: &'a mut Arc<ChunkSamples<W>>) -> &'a mut ChunkSamples<W> {
         if Arc::get_mut(samples).is_none()
@@ -55,8 +70,6 @@ impl<W> Default for SpareSamples<W> {
 
 #[cfg(test)]
 mod tests {
-    use alloc::vec;
-
     use super::*;
 
     fn samples(weight: i16) -> Arc<ChunkSamples> {
@@ -64,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_used_again_for_copies_only() {
+    fn memory_is_used_again() {
         let mut spare = SpareSamples::new();
         let old = samples(1);
         let address = old.weights.as_ptr();
@@ -82,6 +95,11 @@ mod tests {
         let clone = own.clone();
         spare.make_mut(&mut own).weights[4] = 6;
         assert_eq!((own.weights[3], own.weights[4], clone.weights[4]), (5, 6, 2), "copied without spare memory");
+        spare.keep(Chunk::Samples(clone));
+        let written = spare.filled(Voxel::new(8, 9), 343);
+        assert_eq!(written.weights.as_ptr(), address);
+        assert_eq!(*written, ChunkSamples { weights: vec![8; 343], materials: vec![9; 343] });
+        assert_eq!(*spare.filled(Voxel::new(8, 9), 343), *written, "without spare memory");
         (0..2 * MOST).for_each(|_| spare.keep(Chunk::Samples(samples(3))));
         assert_eq!(spare.0.len(), MOST);
     }
