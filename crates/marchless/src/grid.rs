@@ -14,7 +14,7 @@ use thiserror::Error;
 
 pub use self::block::{Block, Neighbourhood, NeighbourhoodView};
 use self::border::Border;
-pub use self::chunk::{Chunk, ChunkSamples};
+pub use self::chunk::{BOUND_BOX_CHUNKS, Chunk, ChunkSamples};
 pub use self::spare::SpareSamples;
 use crate::buffer::MeshBuffer;
 use crate::lattice::Region;
@@ -168,8 +168,7 @@ impl<W: Weight> Grid<W> {
         self.chunks.remove(&position)
     }
 
-    /// Samples `source` for the chunk at `position` ([`Chunk::from_source`]) and puts it there. `spacing`: world units
-    /// per voxel.
+    /// Puts the base samples of `source` ([`Chunk::from_source`]) at `position`. `spacing`: world units per voxel.
     ///
     /// ```
     /// use marchless::{Grid, Region};

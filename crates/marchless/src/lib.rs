@@ -111,8 +111,8 @@ pub use brush::{BrushError, BrushShape, EDIT_LIMIT, Edit, Operation, Stamp, Stro
 pub use buffer::MeshBuffer;
 pub use cell::{CaseIndex, Corner, Edge, Face};
 pub use grid::{
-    Block, Chunk, ChunkSamples, DEFAULT_CHUNK_CELLS, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, Neighbourhood,
-    NeighbourhoodView, SpareSamples,
+    BOUND_BOX_CHUNKS, Block, Chunk, ChunkSamples, DEFAULT_CHUNK_CELLS, Grid, GridError, MAX_CHUNK_CELLS,
+    MIN_CHUNK_CELLS, Neighbourhood, NeighbourhoodView, SpareSamples,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 #[cfg(feature = "std")]

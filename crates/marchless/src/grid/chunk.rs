@@ -9,6 +9,9 @@ use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples};
 use crate::sample::{Voxel, Weight};
 use crate::source::{BOUND_MARGIN, Bound, Source, SourceRegion};
 
+/// Chunks per axis of the boxes that a [`Source`] is asked to bound as a whole: see [`Chunk::from_source`].
+pub const BOUND_BOX_CHUNKS: i32 = 4;
+
 /// The samples of one chunk. Cloning is cheap, and the clone is unaffected by later edits.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Chunk<W = i16> {
@@ -31,27 +34,85 @@ impl<W: Weight> Chunk<W> {
     /// A chunk of air.
     pub const AIR: Self = Self::Uniform(Voxel::AIR);
 
-    /// Samples `source` for the chunk at chunk position `position`; runs on any thread.
+    /// The base samples of the chunk at chunk position `position`; runs on any thread.
     ///
-    /// The source is asked for a [close bound](Source::bound_closely) of the chunk first: the distances that are left out
-    /// are too far from the surface to matter to it, for isovalues within ±3 voxels. `cells`: 8 to 62, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit in `i32`
-    /// gives the chunk nearest to it; no grid takes it.
+    /// The first of these steps that gives an answer decides:
+    /// 1. [`Source::bound`] of the [box](Self::bound_box) of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk, grown by
+    ///    4 points: [`Chunk::box_without_sampling`];
+    /// 2. [`Source::bound`] of the chunk, grown by 4 points: [`Chunk::without_sampling_in`];
+    /// 3. [`Source::bound_closely`] of the chunk;
+    /// 4. [`Source::fill`].
+    ///
+    /// A bound makes the chunk uniform, so two legal bounds of one region may stand for different samples. The fixed order
+    /// makes the result a function of the arguments alone: it does not depend on which steps a caller takes on its own,
+    /// or when. The distances that a bound leaves out are too far from the surface to matter to it, for isovalues within
+    /// ±3 voxels.
+    ///
+    /// `cells`: 8 to 62 per axis, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit in
+    /// `i32` gives the chunk nearest to it; no grid takes it.
     pub fn from_source(source: &(impl Source + ?Sized), position: [i32; 3], cells: u32, spacing: f64) -> Self {
         Self::from_source_counted(source, position, cells, spacing).0
     }
 
-    /// The chunk at `position` where `source` is certain of it [without sampling](Source::bound); arguments as of
-    /// [`Chunk::from_source`].
+    /// The result of [`Chunk::from_source`], and whether it took sampling (step 4). Arguments as there.
+    pub fn from_source_counted(
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        cells: u32,
+        spacing: f64,
+    ) -> (Self, bool) {
+        if let Some(chunk) = Self::without_sampling(source, position, cells, spacing) {
+            return (chunk, false);
+        }
+        let region = source_region(position, 1, cells, spacing);
+        match Self::from_bound(source.bound_closely(&region)) {
+            Some(chunk) => (chunk, false),
+            None => (Self::sampled(source, &region), true),
+        }
+    }
+
+    /// Steps 1 and 2 of [`Chunk::from_source`]: its result where [`Source::bound`] suffices for it, `None` where steps 3
+    /// and 4 must follow. Costs two bounds at most. Arguments as there.
     pub fn without_sampling(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
         cells: u32,
         spacing: f64,
     ) -> Option<Self> {
-        Self::box_without_sampling(source, position, 1, cells, spacing)
+        let corner = Self::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS); // fits: no farther from 0 than `i32::MIN`
+        let of_box = Self::box_without_sampling(source, corner, BOUND_BOX_CHUNKS as u32, cells, spacing);
+        Self::without_sampling_in(of_box, source, position, cells, spacing)
     }
 
-    /// The same for all chunks of a box: `chunks` per axis, `position` the lowest. They are all alike then.
+    /// The same for callers that keep the answers of boxes. `of_box`: the answer of [`Chunk::box_without_sampling`] to
+    /// the [box](Self::bound_box) of `position`, for the same source, cells and spacing. Costs one bound at most.
+    ///
+    /// ```
+    /// use marchless::{BOUND_BOX_CHUNKS, Chunk};
+    ///
+    /// let source = |[_, y, _]: [f64; 3]| y - 7.5;
+    /// let position = [5, -1, 3];
+    /// let corner = Chunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
+    /// assert_eq!(corner, [4, -4, 0]);
+    /// let of_box = Chunk::<i16>::box_without_sampling(&source, corner, BOUND_BOX_CHUNKS as u32, 16, 1.0);
+    /// let chunk = Chunk::without_sampling_in(of_box, &source, position, 16, 1.0);
+    /// assert_eq!(chunk, Chunk::without_sampling(&source, position, 16, 1.0));
+    /// ```
+    pub fn without_sampling_in(
+        of_box: Option<Self>,
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        cells: u32,
+        spacing: f64,
+    ) -> Option<Self> {
+        of_box.or_else(|| Self::box_without_sampling(source, position, 1, cells, spacing))
+    }
+
+    /// Each chunk of a box, which are all alike, where [`Source::bound`] is certain of the box grown by 4 points.
+    ///
+    /// `position`: the lowest chunk. `chunks`: chunks per axis. Other arguments as of [`Chunk::from_source`]. Only the
+    /// answer to a whole box of [`BOUND_BOX_CHUNKS`], aligned as [`Chunk::bound_box`] says, is sure to be what
+    /// `from_source` gives: of another box, an answer may differ from it far from the surface.
     pub fn box_without_sampling(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -62,18 +123,10 @@ impl<W: Weight> Chunk<W> {
         Self::from_bound(source.bound(&source_region(position, chunks, cells, spacing).grown(BOUND_MARGIN)))
     }
 
-    /// The chunk at `position`, and whether it took sampling; arguments as of [`Chunk::from_source`], whose result it is.
-    pub fn from_source_counted(
-        source: &(impl Source + ?Sized),
-        position: [i32; 3],
-        cells: u32,
-        spacing: f64,
-    ) -> (Self, bool) {
-        let region = source_region(position, 1, cells, spacing);
-        match Self::from_bound(source.bound_closely(&region)) {
-            Some(chunk) => (chunk, false),
-            None => (Self::sampled(source, &region), true),
-        }
+    /// The position, in boxes, of the box of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk at `position`. The lowest
+    /// chunk of a box is this position times `BOUND_BOX_CHUNKS`.
+    pub fn bound_box(position: [i32; 3]) -> [i32; 3] {
+        position.map(|v| v.div_euclid(BOUND_BOX_CHUNKS))
     }
 
     fn from_bound(bound: Bound) -> Option<Self> {
