@@ -3,18 +3,22 @@
 mod block;
 pub(crate) mod border;
 mod chunk;
+mod chunks;
+pub(crate) mod occupancy;
 mod redrawn;
 mod spare;
 #[cfg(test)]
 mod tests;
 
-use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::collections::BTreeSet;
 
 use thiserror::Error;
 
 pub use self::block::{Block, Neighbourhood, NeighbourhoodView};
 use self::border::Border;
 pub use self::chunk::{BOUND_BOX_CHUNKS, Chunk, ChunkSamples};
+use self::chunks::Chunks;
+use self::occupancy::Occupancy;
 pub use self::spare::SpareSamples;
 use crate::buffer::MeshBuffer;
 use crate::lattice::Region;
@@ -28,6 +32,9 @@ pub const DEFAULT_CHUNK_CELLS: u32 = 32;
 pub const MIN_CHUNK_CELLS: u32 = 8;
 /// The most cells per axis that a chunk may have.
 pub const MAX_CHUNK_CELLS: u32 = 62;
+
+/// Up to so many chunk positions are marked dirty without a look at which of them hold a chunk.
+const MOST_MARKED_ABSENT: u128 = 4096;
 
 /// A sparse volume of samples in chunks of `n` cells per axis: the chunk at `c` owns the lattice points
 /// `c·n` to `c·n + n − 1` of each axis.
@@ -52,7 +59,7 @@ pub const MAX_CHUNK_CELLS: u32 = 62;
 pub struct Grid<W = i16> {
     cells: u32,
     bounds: Option<Region>,
-    chunks: BTreeMap<[i32; 3], Chunk<W>>,
+    chunks: Chunks<W>,
     dirty: BTreeSet<[i32; 3]>,
 }
 
@@ -63,7 +70,7 @@ impl<W: Weight> Grid<W> {
     /// [`GridError::ChunkCells`].
     pub fn new(chunk_cells: u32) -> Result<Self, GridError> {
         check_cells(chunk_cells)?;
-        Ok(Self { cells: chunk_cells, bounds: None, chunks: BTreeMap::new(), dirty: BTreeSet::new() })
+        Ok(Self { cells: chunk_cells, bounds: None, chunks: Chunks::new(), dirty: BTreeSet::new() })
     }
 
     /// An empty grid of the chunks in `chunks`, with air around them.
@@ -111,7 +118,7 @@ impl<W: Weight> Grid<W> {
     /// surface on the outermost planes and one voxel more with each point farther out.
     pub fn get(&self, point: [i32; 3]) -> Voxel<W> {
         let position = self.chunk_of(point);
-        match (self.chunks.get(&position), self.border()) {
+        match (self.chunks.get(position), self.border()) {
             (Some(chunk), _) => chunk.voxel(self.index(point)),
             (None, Some(border)) if !self.limits().contains(position) => border.beyond(point.map(i64::from)),
             (None, _) => Voxel::AIR,
@@ -165,7 +172,7 @@ impl<W: Weight> Grid<W> {
 
     /// Takes the chunk at `position` out and marks nothing dirty.
     pub fn unload(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
-        self.chunks.remove(&position)
+        self.chunks.remove(position)
     }
 
     /// Puts the base samples of `source` ([`Chunk::from_source`]) at `position`. `spacing`: world units per voxel.
@@ -191,22 +198,40 @@ impl<W: Weight> Grid<W> {
 
     /// The chunk at `position`, where there is one.
     pub fn chunk(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
-        self.chunks.get(&position)
+        self.chunks.get(position)
     }
 
     /// All chunks, in order of position.
     pub fn chunks(&self) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
-        self.chunks.iter().map(|(position, chunk)| (*position, chunk))
+        self.chunks.iter()
     }
 
     /// The chunks from `position` on, in the order of [`chunks`](Self::chunks): for going through them a part at a time.
     pub fn chunks_from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
-        self.chunks.range(position..).map(|(position, chunk)| (*position, chunk))
+        self.chunks.from(position)
+    }
+
+    /// The chunks at the positions within `region`, each once and always in the same order, which is not that of
+    /// [`chunks`](Self::chunks). The cost is in proportion to what is there, whatever the size of the region or the grid.
+    ///
+    /// ```
+    /// use marchless::{Chunk, Grid, Region};
+    ///
+    /// let mut grid = Grid::<i16>::new(32)?;
+    /// for position in [[0, 0, 0], [-70_000, 3, 9], [5, 0, 0]] {
+    ///     grid.insert(position, Chunk::AIR)?;
+    /// }
+    /// let west = Region::new([i32::MIN; 3], [5, i32::MAX, i32::MAX]);
+    /// assert_eq!(grid.chunks_in(west).count(), 2);
+    /// # Ok::<(), marchless::GridError>(())
+    /// ```
+    pub fn chunks_in(&self, region: Region) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+        self.chunks.positions_in(region).filter_map(|position| Some((position, self.chunk(position)?)))
     }
 
     /// Takes the chunk at `position` out, so that it reads as air, and marks it and its neighbours dirty.
     pub fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
-        let chunk = self.chunks.remove(&position)?;
+        let chunk = self.chunks.remove(position)?;
         self.mark_dirty(self.chunk_region(position));
         Some(chunk)
     }
@@ -232,8 +257,8 @@ impl<W: Weight> Grid<W> {
         for (j, y) in around[1].into_iter().enumerate() {
             for (i, x) in around[0].into_iter().enumerate() {
                 // Looking for one end only is quicker.
-                let column = self.chunks.range([x, y, around[2][0]]..);
-                for (neighbour, chunk) in column.take_while(|(neighbour, _)| **neighbour <= [x, y, around[2][2]]) {
+                let column = self.chunks.from([x, y, around[2][0]]);
+                for (neighbour, chunk) in column.take_while(|(neighbour, _)| *neighbour <= [x, y, around[2][2]]) {
                     let k = (neighbour[2] - around[2][0]) as usize;
                     chunks[i + 3 * (j + 3 * k)] = Some(chunk);
                 }
@@ -258,18 +283,18 @@ impl<W: Weight> Grid<W> {
     }
 
     /// Marks the chunks dirty whose meshes read a point of `changed`. Absent chunks without a present neighbour have
-    /// no mesh, and may be left out where there are many.
+    /// no mesh, and may be left out where there are many; the cost is then in proportion to the present chunks there.
     pub fn mark_dirty(&mut self, changed: Region) {
         let affected = self.chunks_affected_by(changed);
         if affected.is_empty() {
             return;
         }
         let count = affected.size().into_iter().map(u128::from).product::<u128>();
-        if count <= 27 * (self.chunks.len() as u128 + 1) {
+        if count <= MOST_MARKED_ABSENT {
             self.dirty.extend(affected.points());
             return;
         }
-        for &position in self.chunks.keys() {
+        for position in self.chunks.positions_in(affected.grown(1, 1)) {
             let around = Region::new(position, position).grown(1, 2);
             self.dirty.extend(around.intersection(&affected).points());
         }
@@ -304,7 +329,12 @@ impl<W: Weight> Grid<W> {
     /// border and marks what has changed.
     pub(crate) fn chunk_mut(&mut self, position: [i32; 3]) -> Result<&mut Chunk<W>, GridError> {
         self.check(position)?;
-        Ok(self.chunks.entry(position).or_insert(Chunk::AIR))
+        Ok(self.chunks.get_mut_or_air(position))
+    }
+
+    /// Which chunk positions hold a chunk.
+    pub(crate) const fn occupancy(&self) -> &Occupancy {
+        self.chunks.occupancy()
     }
 
     /// The border of a bounded grid, that all samples written are clipped to.

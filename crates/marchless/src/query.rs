@@ -1,23 +1,23 @@
 //! Questions to a [`Grid`]: what a ray hits, and the weight anywhere.
 //!
-//! A ray walks from chunk to chunk, past those that are uniform, and from cell to cell in the others (John Amanatides
-//! and Andrew Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", 1987). In a cell that the surface crosses it is
-//! tested against the very triangles that the mesher makes of it.
+//! A ray descends through the grid's boxes of boxes of chunks into those that hold a chunk, passes by chunks that are
+//! uniform, and walks from cell to cell in the others (John Amanatides and Andrew Woo, "A Fast Voxel Traversal Algorithm
+//! for Ray Tracing", 1987). In a cell that the surface crosses it is tested against the very triangles that the mesher
+//! makes of it.
 
+mod boxes;
 mod ray;
 #[cfg(test)]
 mod tests;
 
-use alloc::{collections::BTreeSet, vec::Vec};
-
 use crate::{
     cell::{CaseIndex, Corner, Edge},
-    grid::{Chunk, Grid, border::Border},
-    lattice::Region,
+    grid::{Chunk, ChunkSamples, Grid, border::Border},
     mesher::crossing_fraction,
     sample::{Voxel, Weight},
 };
-use ray::{Crossing, Ray};
+use boxes::BoxWalk;
+use ray::{Crossing, Cubes, Ray};
 
 /// Where a ray hits the surface first; lengths and positions in lattice units (voxels).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,33 +64,32 @@ pub fn ray_cast<W: Weight>(
         return None;
     }
     let ray = Ray::new(origin, direction, max_distance)?;
-    let cells = i64::from(grid.chunk_cells());
-    let hit = |chunk| {
-        let surface = Surface::new(grid, chunk, isovalue);
+    let limits = grid.limits();
+    let hit = |chunk: [i32; 3]| {
+        let surface = limits.contains(chunk).then(|| Surface::new(grid, chunk, isovalue))?;
         if surface.is_empty() {
             return None;
         }
-        ray.walk(grid.chunk_region(chunk), 1).find_map(|cell| surface.hit(&ray, cell))
+        ray.walk(grid.chunk_region(chunk), Cubes::of(1)).find_map(|cell| surface.hit(&ray, cell))
     };
-    let limits = grid.limits();
-    if ray.steps(limits, cells) <= NEAR {
-        return ray.walk(limits, cells).find_map(hit);
+    let chunks = Cubes::of(grid.chunk_cells().into());
+    let most = if is_shown_without_chunks(grid, isovalue) { MOST_WITHOUT_CHUNKS } else { NEAR };
+    if ray.steps(limits, chunks) <= most {
+        return ray.walk(limits, chunks).find_map(hit);
     }
-    let drawn = grid.chunks().map(|(position, _)| drawn_by(grid, position));
-    let all = drawn.reduce(|all, region| all.union(&region))?;
-    if ray.steps(all, cells) <= NEAR + grid.chunks().count() as f64 {
-        return ray.walk(all, cells).find_map(hit);
-    }
-    // Few chunks far apart: those that the ray enters, in the order in which it does.
-    let candidates: BTreeSet<_> = grid.chunks().flat_map(|(position, _)| drawn_by(grid, position).points()).collect();
-    let enters = |chunk: [i32; 3]| Some((ray.span(Region::new(chunk, chunk).grown(0, 1), cells)?.0, chunk));
-    let mut entered: Vec<_> = candidates.into_iter().filter_map(enters).collect();
-    entered.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-    entered.into_iter().find_map(|(_, chunk)| hit(chunk))
+    BoxWalk::new(grid.occupancy(), &ray, grid.chunk_cells()).find_map(hit)
 }
 
 /// A ray that passes no more chunk positions than this is walked without a look at which of them have chunks.
-const NEAR: f64 = 64.0;
+const NEAR: f64 = 8.0;
+/// The same where meshes need no chunk; a longer ray goes by the chunks that are there all the same.
+const MOST_WITHOUT_CHUNKS: f64 = 65536.0;
+
+/// Whether even absent chunks are inside, and the border of a bounded grid is all that ends them: so it is at isovalues
+/// beyond the weights' range.
+fn is_shown_without_chunks<W: Weight>(grid: &Grid<W>, isovalue: f32) -> bool {
+    grid.bounds().is_some() && W::OUTSIDE.inside(W::threshold(isovalue))
+}
 
 /// The weight at any position, in voxels: trilinear between the eight lattice points around it; finite, infinite and
 /// NaN samples count as the farthest finite ones of their side. `None` where the position is not finite.
@@ -116,18 +115,13 @@ pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
     Some(weight.sum::<f64>() as f32)
 }
 
-/// The chunk positions whose meshes read a chunk's samples for more than normals.
-fn drawn_by<W: Weight>(grid: &Grid<W>, position: [i32; 3]) -> Region {
-    Region::new(position, position).grown(1, 1).intersection(&grid.limits())
-}
-
 /// The triangles of one chunk.
-struct Surface<W: Weight> {
+struct Surface<'a, W: Weight> {
     position: [i32; 3],
     /// The chunk's lowest lattice point.
     origin: [i32; 3],
     /// The chunk and its neighbours on the high sides: bit 0 of the index is x, bit 1 y, bit 2 z.
-    chunks: [Chunk<W>; 8],
+    chunks: [Part<'a, W>; 8],
     /// Cells per axis.
     cells: i32,
     isovalue: f32,
@@ -135,14 +129,24 @@ struct Surface<W: Weight> {
     border: Option<Border>,
 }
 
-impl<W: Weight> Surface<W> {
-    fn new(grid: &Grid<W>, position: [i32; 3], isovalue: f32) -> Self {
+/// A chunk, borrowed.
+#[derive(Clone, Copy)]
+enum Part<'a, W> {
+    Uniform(Voxel<W>),
+    Samples(&'a ChunkSamples<W>),
+}
+
+impl<'a, W: Weight> Surface<'a, W> {
+    fn new(grid: &'a Grid<W>, position: [i32; 3], isovalue: f32) -> Self {
         let chunks = Corner::ALL.map(|corner| {
             let offset = corner.offset();
             let position = [0, 1, 2].map(|axis| position[axis].saturating_add(offset[axis].into()));
-            // Beyond the bounds, all that a chunk's cells read lies on the outermost planes and is the same.
-            let absent = || Chunk::Uniform(grid.get(grid.chunk_region(position).min));
-            grid.chunk(position).cloned().unwrap_or_else(absent)
+            match grid.chunk(position) {
+                Some(Chunk::Uniform(voxel)) => Part::Uniform(*voxel),
+                Some(Chunk::Samples(samples)) => Part::Samples(samples),
+                // Beyond the bounds, all that a chunk's cells read lies on the outermost planes and is the same.
+                None => Part::Uniform(grid.get(grid.chunk_region(position).min)),
+            }
         });
         let region = grid.chunk_region(position);
         let border = grid.border().and_then(|border| border.raised(isovalue));
@@ -159,9 +163,9 @@ impl<W: Weight> Surface<W> {
     /// Whether it is certain, without looking at single samples, that there are none.
     fn is_empty(&self) -> bool {
         let threshold = W::threshold(self.isovalue);
-        let inside = |chunk: &Chunk<W>| match chunk {
-            Chunk::Uniform(voxel) => Some(voxel.weight.inside(threshold)),
-            Chunk::Samples(_) => None,
+        let inside = |chunk: &Part<'_, W>| match chunk {
+            Part::Uniform(voxel) => Some(voxel.weight.inside(threshold)),
+            Part::Samples(_) => None,
         };
         let first = inside(&self.chunks[0]);
         self.border.is_none() && first.is_some() && self.chunks.iter().all(|chunk| inside(chunk) == first)
@@ -170,8 +174,11 @@ impl<W: Weight> Surface<W> {
     /// The nearest hit in `cell`.
     fn hit(&self, ray: &Ray, cell: [i32; 3]) -> Option<RayHit> {
         let local = [0, 1, 2].map(|axis| cell[axis] - self.origin[axis]);
-        let corners = Corner::ALL.map(|corner| self.voxel(local, corner));
         let threshold = W::threshold(self.isovalue);
+        if self.is_one_sided(local, threshold) {
+            return None;
+        }
+        let corners = Corner::ALL.map(|corner| self.voxel(local, corner));
         let case = (0..8).fold(0, |case, i| case | u8::from(corners[i].weight.inside(threshold)) << i);
         let mut nearest: Option<(Crossing, [Edge; 3])> = None;
         for &edges in CaseIndex(case).triangles() {
@@ -195,6 +202,23 @@ impl<W: Weight> Surface<W> {
         })
     }
 
+    /// Whether the cell at `local` lies within the chunk's own samples and has all its corners on one side. Most cells of a
+    /// ray do, and this is the quickest way to leave them.
+    fn is_one_sided(&self, local: [i32; 3], threshold: W::Threshold) -> bool {
+        let Part::Samples(ChunkSamples { weights, .. }) = self.chunks[0] else { return false };
+        if self.border.is_some() || local.iter().any(|&v| v + 1 >= self.cells) {
+            return false;
+        }
+        let [x, y, z] = local.map(|v| v as usize);
+        let row = self.cells as usize;
+        let start = x + row * (y + row * z);
+        let first = weights[start].inside(threshold);
+        [0, row, row * row, row * row + row].into_iter().all(|step| {
+            let [low, high] = [weights[start + step], weights[start + step + 1]];
+            low.inside(threshold) == first && high.inside(threshold) == first
+        })
+    }
+
     /// The sample at a corner of the cell at `local`, counted from the chunk's lowest point.
     fn voxel(&self, local: [i32; 3], corner: Corner) -> Voxel<W> {
         let (mut chunk, mut index, mut stride) = (0, 0, 1);
@@ -207,7 +231,10 @@ impl<W: Weight> Surface<W> {
             }
             stride *= self.cells as usize;
         }
-        let voxel = self.chunks[chunk].voxel(index);
+        let voxel = match self.chunks[chunk] {
+            Part::Uniform(voxel) => voxel,
+            Part::Samples(samples) => Voxel::new(samples.weights[index], samples.materials[index]),
+        };
         match &self.border {
             Some(border) => {
                 let offset = corner.offset();

@@ -333,6 +333,45 @@ fn the_ends_of_the_lattice_are_reached_without_panic() {
     }
 }
 
+#[test]
+fn huge_regions_mark_the_chunks_within_and_around_and_no_others() {
+    let mut grid = Grid::<i16>::new(8).unwrap();
+    for position in [[0, 0, 0], [70_000, -3, 5], [-50, 2, 2], [9, 9, 400_000]] {
+        grid.load(position, Chunk::AIR).unwrap();
+    }
+    let region = Region::new([-80_000, -80_000, -80_000], [10_000_000, 80_000, 80_000]);
+    grid.mark_dirty(region);
+    let within = [[0, 0, 0], [70_000, -3, 5], [-50, 2, 2]];
+    assert_eq!(grid.dirty(), &within.into_iter().flat_map(|position| around(position).points()).collect());
+    // Samples of a chunk just outside are read by those within.
+    grid.take_dirty();
+    grid.mark_dirty(Region::new([8, -8_000, -8_000], [8_000, 8_000, 8_000]));
+    let around_zero = around([0; 3]).points().filter(|position| position[0] >= 0);
+    assert_eq!(grid.dirty(), &around_zero.collect());
+}
+
+proptest! {
+    #[test]
+    fn chunks_in_a_region_are_those_of_all_chunks_that_lie_in_it((mut grid, centre) in grid(), shift in [-2..2i32, -2..2, -2..2]) {
+        let low: [i32; 3] = core::array::from_fn(|axis| centre[axis] + shift[axis]);
+        let region = Region::new(low, low.map(|v| v + 2));
+        let everything = Region::new([i32::MIN; 3], [i32::MAX; 3]);
+        for position in around(centre).points().step_by(2) {
+            for region in [region, everything] {
+                let expected: BTreeMap<_, _> = grid.chunks().filter(|(position, _)| region.contains(*position)).collect();
+                prop_assert_eq!(grid.chunks_in(region).count(), expected.len());
+                prop_assert_eq!(grid.chunks_in(region).collect::<BTreeMap<_, _>>(), expected);
+            }
+            // All ways in and out.
+            match position[0].rem_euclid(3) {
+                0 => drop(grid.unload(position)),
+                1 => drop(grid.remove(position)),
+                _ => drop(grid.set(grid.chunk_region(position).min, Voxel::new(-7, 1))),
+            }
+        }
+    }
+}
+
 /// A ball of stone with a hollow, which knows its bounds.
 #[derive(Clone, Copy)]
 struct Shell {

@@ -2,6 +2,25 @@
 
 use crate::{lattice::Region, math::sqrt_f64};
 
+/// A lattice of cubes: along each axis, cube `c` reaches from `origin + c·size` to `origin + (c + 1)·size`, in voxels.
+#[derive(Clone, Copy)]
+pub(super) struct Cubes {
+    pub(super) size: i64,
+    pub(super) origin: i64,
+}
+
+impl Cubes {
+    /// Cubes of a size, one of which lies at the origin.
+    pub(super) const fn of(size: i64) -> Self {
+        Self { size, origin: 0 }
+    }
+
+    /// The plane on the low (0) or high (1) side of a cube: the same number, bit for bit, for all lattices that have it.
+    const fn plane(self, cube: i32, side: i64) -> f64 {
+        (self.origin + (cube as i64 + side) * self.size) as f64
+    }
+}
+
 /// A ray of limited length.
 #[derive(Clone, Copy)]
 pub(super) struct Ray {
@@ -28,11 +47,11 @@ impl Ray {
         [0, 1, 2].map(|axis| self.origin[axis] + self.direction[axis] * distance)
     }
 
-    /// When the ray enters and leaves `region`, where it does; cell `c` reaches from `c·size` to `(c + 1)·size`.
-    pub(super) fn span(&self, region: Region, size: i64) -> Option<(f64, f64)> {
+    /// When the ray enters and leaves `region`, where it does.
+    pub(super) fn span(&self, region: Region, cubes: Cubes) -> Option<(f64, f64)> {
         let (mut start, mut end) = (0.0f64, self.max_distance);
         for axis in 0..3 {
-            let [low, high] = [plane(region.min[axis], 0, size), plane(region.max[axis], 0, size)];
+            let [low, high] = [cubes.plane(region.min[axis], 0), cubes.plane(region.max[axis], 0)];
             if self.direction[axis] != 0.0 {
                 let [a, b] = [self.reaches(axis, low), self.reaches(axis, high)];
                 (start, end) = (start.max(a.min(b)), end.min(a.max(b)));
@@ -49,39 +68,42 @@ impl Ray {
     }
 
     /// No fewer than [`walk`](Self::walk) goes through.
-    pub(super) fn steps(&self, region: Region, size: i64) -> f64 {
-        let Some((start, end)) = self.span(region, size) else { return 0.0 };
+    pub(super) fn steps(&self, region: Region, cubes: Cubes) -> f64 {
+        let Some((start, end)) = self.span(region, cubes) else { return 0.0 };
         let passed = |axis: usize| {
             let along = self.direction[axis].abs();
             // From very far away, many planes are reached at what is the same number.
             let rounding = 4.0 * f64::EPSILON * (self.origin[axis].abs() + along * end);
-            (along * (end - start) + rounding) / size as f64
+            (along * (end - start) + rounding) / cubes.size as f64
         };
         // One more than planes are passed, of which each axis may have one more than the length has sizes.
         (0..3).map(passed).sum::<f64>() + 4.0
     }
 
-    /// The cells of `region` that the ray passes, in order.
-    pub(super) fn walk(&self, region: Region, size: i64) -> impl Iterator<Item = [i32; 3]> {
-        let span = self.span(region, size);
+    /// The cubes of `region` that the ray passes, in order.
+    pub(super) fn walk(&self, region: Region, cubes: Cubes) -> impl Iterator<Item = [i32; 3]> {
+        let span = self.span(region, cubes);
         let end = span.map_or(0.0, |(_, end)| end);
         let mut next = span.map(|(start, _)| {
             let entry = self.at(start);
             [0, 1, 2].map(|axis| {
-                let cell = libm::floor(entry[axis] / size as f64);
+                let cell = libm::floor((entry[axis] - cubes.origin as f64) / cubes.size as f64);
                 (cell as i32).clamp(region.min[axis], region.max[axis] - 1)
             })
         });
+        let exit = move |cell: [i32; 3], axis: usize| match self.direction[axis] {
+            0.0 => f64::INFINITY,
+            direction => self.reaches(axis, cubes.plane(cell[axis], (direction > 0.0).into())),
+        };
+        let mut exits = next.map_or([0.0; 3], |cell| [0, 1, 2].map(|axis| exit(cell, axis)));
         core::iter::from_fn(move || {
             let cell = next?;
-            let exits = [0, 1, 2].map(|axis| match self.direction[axis] {
-                0.0 => f64::INFINITY,
-                direction => self.reaches(axis, plane(cell[axis], (direction > 0.0).into(), size)),
-            });
             let axis = (0..3).fold(0, |first, axis| if exits[axis] < exits[first] { axis } else { first });
             let mut following = cell;
             following[axis] += if self.direction[axis] > 0.0 { 1 } else { -1 };
-            next = (exits[axis] <= end && region.contains(following)).then_some(following);
+            let is_within = (region.min[axis]..region.max[axis]).contains(&following[axis]);
+            next = (exits[axis] <= end && is_within).then_some(following);
+            exits[axis] = exit(following, axis);
             Some(cell)
         })
     }
@@ -136,9 +158,4 @@ fn normal(triangle: [[f32; 3]; 3]) -> [f32; 3] {
 fn unit(v: [f64; 3]) -> [f64; 3] {
     let length = sqrt_f64(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     v.map(|v| v / length)
-}
-
-/// The plane on the low (0) or high (1) side of a cell.
-fn plane(cell: i32, side: i64, size: i64) -> f64 {
-    ((i64::from(cell) + side) * size) as f64
 }

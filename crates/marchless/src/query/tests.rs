@@ -1,6 +1,6 @@
 //! Ray casts against all the triangles of all the meshes.
 
-use alloc::vec::Vec;
+use alloc::{sync::Arc, vec::Vec};
 
 use proptest::prelude::*;
 
@@ -8,6 +8,7 @@ use super::*;
 use crate::{
     brush::{BrushShape, Operation, Stamp},
     buffer::MeshBuffer,
+    lattice::Region,
     mesher::{MeshSettings, Mesher},
 };
 
@@ -172,7 +173,7 @@ proptest! {
     ) {
         if let Some(ray) = Ray::new(origin, direction, length) {
             let region = Region::new([-4, -30, -5], [20, 30, 7]);
-            let (steps, walked) = (ray.steps(region, 8), ray.walk(region, 8).count());
+            let (steps, walked) = (ray.steps(region, Cubes::of(8)), ray.walk(region, Cubes::of(8)).count());
             prop_assert!(walked as f64 <= steps && steps <= 2.0 * walked as f64 + 5.0, "{walked}, not {steps}");
         }
     }
@@ -219,7 +220,7 @@ fn rays_from_beyond_all_precision_come_to_an_end() {
         );
         let ray = Ray::new(origin, [-1.0, 0.0, 0.0], f64::INFINITY).unwrap();
         let region = Region::new([-100, 0, 0], [100, 1, 1]);
-        assert!(ray.walk(region, 8).count() as f64 <= ray.steps(region, 8));
+        assert!(ray.walk(region, Cubes::of(8)).count() as f64 <= ray.steps(region, Cubes::of(8)));
     }
 }
 
@@ -285,4 +286,140 @@ fn weights_are_finite_whatever_the_samples_are() {
         assert!(weight_at(&grid, position).is_some_and(f32::is_finite), "at {position:?}");
     }
     assert!(weight_at(&grid, [0.0; 3]).is_some_and(|weight| weight < 0.0));
+}
+
+/// The nearest hit in all chunks that have a mesh, gone through one by one.
+fn nearest_of_all(
+    grid: &Grid<i16>,
+    isovalue: f32,
+    origin: [f64; 3],
+    direction: [f64; 3],
+    max_distance: f64,
+) -> Option<RayHit> {
+    let ray = Ray::new(origin, direction, max_distance)?;
+    let drawn = grid.chunks().flat_map(|(position, _)| Region::new(position, position).grown(1, 1).points());
+    let hits = drawn.filter(|&position| grid.check(position).is_ok()).filter_map(|position| {
+        let surface = Surface::new(grid, position, isovalue);
+        ray.walk(grid.chunk_region(position), Cubes::of(1)).find_map(|cell| surface.hit(&ray, cell))
+    });
+    hits.min_by(|a, b| a.distance.total_cmp(&b.distance))
+}
+
+/// A grid of few chunks, some side by side, some at the two ends of the lattice.
+fn sparse_grid() -> impl Strategy<Value = Grid<i16>> {
+    let end = Grid::<i16>::largest(CELLS).max[0];
+    let coordinate = move || prop_oneof![6 => -3..3i32, 2 => -70..70i32, 1 => -100_000..100_000i32, 1 => Just(end - 2), 1 => Just(-end)];
+    let chunk = prop_oneof![
+        1 => Just(Chunk::AIR),
+        1 => any::<u8>().prop_map(|material| Chunk::Uniform(Voxel::new(-300, material))),
+        3 => (any::<u64>(), any::<u8>()).prop_map(|(seed, material)| {
+            // Slopes, so that the chunk has a surface somewhere, of one side or more.
+            let slope = [0, 10, 20].map(|shift| (seed >> shift) as i32 % 256 - 128);
+            let start = (seed >> 30) as i32 % 1000 - 500;
+            let weight = |p: [i32; 3]| (start + (0..3).map(|axis| slope[axis] * p[axis]).sum::<i32>()) as i16;
+            let weights: Vec<_> = Region::new([0; 3], [CELLS as i32; 3]).points().map(weight).collect();
+            let materials = alloc::vec![material; weights.len()];
+            Chunk::Samples(Arc::new(ChunkSamples { weights, materials }))
+        }),
+    ];
+    let chunks = prop::collection::vec(([coordinate(), coordinate(), coordinate()], chunk), 1..40);
+    (chunks, 0..3).prop_map(move |(chunks, bounds)| {
+        let mut grid = match bounds {
+            0 => Grid::new(CELLS),
+            1 => Grid::bounded(CELLS, Region::new([-2; 3], [3, 2, 70])),
+            _ => Grid::bounded(CELLS, Grid::<i16>::largest(CELLS)),
+        }
+        .unwrap();
+        for (position, chunk) in chunks {
+            let fits = bounds != 1 || grid.limits().contains(position);
+            assert_eq!(grid.load(position, chunk).is_ok(), fits);
+        }
+        grid
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn boxes_hide_nothing_from_rays(
+        grid in sparse_grid(),
+        isovalue in prop_oneof![Just(0.0f32), -0.9f32..3.0],
+        rays in prop::collection::vec((
+            any::<prop::sample::Index>(),
+            any::<prop::sample::Index>(),
+            prop::array::uniform3(-12.0f64..12.0),
+            prop_oneof![0.0f64..30.0, 0.0f64..1e4, Just(1e7)],
+            direction(),
+            prop_oneof![Just(f64::INFINITY), 0.0f64..3e4],
+        ), 40),
+    ) {
+        let positions: Vec<_> = grid.chunks().map(|(position, _)| position).collect();
+        prop_assume!(!positions.is_empty());
+        for (number, (from, to, shift, away, way, max_distance)) in rays.into_iter().enumerate() {
+            let place = |index: prop::sample::Index| positions[index.index(positions.len())].map(|v| f64::from(v) * 8.0);
+            let target: [f64; 3] = core::array::from_fn(|axis| place(to)[axis] + 4.0 + shift[axis] / 3.0);
+            let origin = match number % 2 {
+                0 => core::array::from_fn(|axis| place(from)[axis] + shift[(axis + 1) % 3]),
+                _ => core::array::from_fn(|axis| target[axis] - way[axis] * away),
+            };
+            let direction = minus(target, origin);
+            let found = ray_cast(&grid, isovalue, origin, direction, max_distance);
+            let expected = nearest_of_all(&grid, isovalue, origin, direction, max_distance);
+            prop_assert_eq!(found.map(|hit| hit.distance), expected.map(|hit| hit.distance), "{:?}, {:?}", found, expected);
+        }
+    }
+}
+
+/// How many boxes and chunk positions a ray passes that hits nothing.
+fn passed(grid: &Grid<i16>, origin: [f64; 3], direction: [f64; 3]) -> (u32, Vec<[i32; 3]>) {
+    let ray = Ray::new(origin, direction, f64::INFINITY).unwrap();
+    let mut walk = BoxWalk::new(grid.occupancy(), &ray, CELLS);
+    let mut chunks = Vec::new();
+    assert_eq!(
+        walk.find_map(|chunk| -> Option<()> {
+            chunks.push(chunk);
+            None
+        }),
+        None
+    );
+    (walk.passed, chunks)
+}
+
+#[test]
+fn walks_are_short_whatever_the_grid_holds() {
+    let mut grid = Grid::<i16>::new(CELLS).unwrap();
+    let ends = [grid.limits().min, grid.limits().max.map(|v| v - 1)];
+    let mut load = |region: Region| {
+        for position in region.points() {
+            grid.load(position, Chunk::AIR).unwrap();
+        }
+        // Down, along a slope, past all, and from one end of the lattice to the other.
+        let middle = ends[1].map(|v| f64::from(v) * 8.0);
+        let rays = [
+            ([3.3, 400.0, 5.7], [0.0, -1.0, 0.0]),
+            ([200.3, 100.0, 5.7], [-1.0, -0.5, 0.3]),
+            ([200.3, 16.1, 5.7], [-1.0, 0.0, 0.3]),
+            ([1e12, 1e12, 1e12], [-1.0, -1.0, -1.0]),
+            (middle, middle.map(|v| -v)),
+            ([4.0, 5.0, -1e300], [0.0, 0.0, 1.0]),
+        ];
+        rays.map(|(origin, direction)| {
+            let (count, chunks) = passed(&grid, origin, direction);
+            (count, chunks.len())
+        })
+    };
+    let one = load(Region::new([0; 3], [1; 3]));
+    assert!(one.iter().all(|&(passed, chunks)| passed <= 24 && chunks <= 4), "{one:?}");
+    let few = load(Region::new([-32, 0, -32], [32, 1, 32]));
+    assert!(few.iter().all(|&(passed, chunks)| passed <= 120 && chunks <= 32), "{few:?}");
+    // Twelve times the chunks: more only where the ray runs along them.
+    let many = load(Region::new([-64, -2, -64], [64, 1, 64]));
+    assert!(many.iter().all(|&(passed, chunks)| passed <= 160 && chunks <= 64), "{many:?}");
+    assert_eq!(many[..2].iter().map(|ray| ray.0).max(), few[..2].iter().map(|ray| ray.0).max());
+    // Some boxes on each level, at either end and in the middle.
+    for end in ends {
+        let far = load(Region::new(end, end.map(|v| v + 1)));
+        assert!(far.iter().all(|&(passed, chunks)| passed <= 700 && chunks <= 64), "{far:?}");
+    }
 }

@@ -1,0 +1,68 @@
+//! [`Chunks`]: the chunks of a grid by position, and where there are some.
+
+use alloc::collections::{BTreeMap, btree_map::Entry};
+
+use super::Chunk;
+use super::occupancy::Occupancy;
+use crate::lattice::Region;
+use crate::sample::Weight;
+
+/// A map from chunk positions to chunks. All positions lie within the limits of a grid.
+#[derive(Clone, Debug)]
+pub(super) struct Chunks<W> {
+    map: BTreeMap<[i32; 3], Chunk<W>>,
+    /// The map's keys.
+    occupancy: Occupancy,
+}
+
+impl<W: Weight> Chunks<W> {
+    pub(super) fn new() -> Self {
+        Self { map: BTreeMap::new(), occupancy: Occupancy::default() }
+    }
+
+    pub(super) fn get(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
+        self.map.get(&position)
+    }
+
+    /// The chunk at `position`, made of air where it is absent.
+    pub(super) fn get_mut_or_air(&mut self, position: [i32; 3]) -> &mut Chunk<W> {
+        match self.map.entry(position) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                self.occupancy.insert(position);
+                entry.insert(Chunk::AIR)
+            }
+        }
+    }
+
+    pub(super) fn insert(&mut self, position: [i32; 3], chunk: Chunk<W>) {
+        if self.map.insert(position, chunk).is_none() {
+            self.occupancy.insert(position);
+        }
+    }
+
+    pub(super) fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
+        let chunk = self.map.remove(&position)?;
+        self.occupancy.remove(position);
+        Some(chunk)
+    }
+
+    /// All chunks, in order of position.
+    pub(super) fn iter(&self) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+        self.map.iter().map(|(position, chunk)| (*position, chunk))
+    }
+
+    /// The chunks from `position` on, in order of position.
+    pub(super) fn from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+        self.map.range(position..).map(|(position, chunk)| (*position, chunk))
+    }
+
+    /// The positions within `region` that hold a chunk, box by box.
+    pub(super) fn positions_in(&self, region: Region) -> impl Iterator<Item = [i32; 3]> {
+        self.occupancy.positions_in(region)
+    }
+
+    pub(super) const fn occupancy(&self) -> &Occupancy {
+        &self.occupancy
+    }
+}
