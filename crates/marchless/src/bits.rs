@@ -37,7 +37,7 @@ pub use components::{Component, Components};
 pub use connectivity::Connectivity;
 pub use materials::MaterialGrid;
 pub use mesh::BitMesher;
-pub(crate) use samples::SignRows;
+use samples::SignRows;
 pub use tile::{Tile, TileGrid};
 
 /// One bit for each lattice point.
@@ -129,7 +129,7 @@ impl BitGrid {
         let size = given.size().map(|size| size.saturating_sub(2 * padding));
         let shape = Shape::new(size).map_err(|_| BitsError::OnlyPadding { shape: given })?;
         let mut grid = Self::new(shape)?;
-        W::pack(Backend::fastest(), SignRows { samples, padding: padding as usize, isovalue, grid: &mut grid });
+        SignRows { samples, padding: padding as usize, isovalue, grid: &mut grid }.pack(Backend::fastest());
         Ok(grid)
     }
 

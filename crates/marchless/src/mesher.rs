@@ -39,8 +39,7 @@ use crate::{
     simd::Backend,
 };
 pub(crate) use classify::sign_row;
-pub(crate) use slabs::Meshing;
-use slabs::{Input, Lattice, Slabs};
+use slabs::{Input, Lattice, Meshing, Slabs};
 pub use stream::SlabMesher;
 #[cfg(feature = "std")]
 pub use threads::ThreadedMesher;
@@ -152,7 +151,7 @@ impl Mesher {
         let lattice = Lattice::of(&samples)?;
         let backend = *self.backend.get_or_insert_with(Backend::fastest);
         let input = Input::Volume { samples, cells: 0..lattice.size[2] - 1 };
-        let meshed = W::mesh(backend, Meshing { input, lattice, settings, slabs: &mut self.slabs, out });
+        let meshed = Meshing { input, lattice, settings, slabs: &mut self.slabs, out }.on(backend);
         if meshed.is_err() {
             out.clear();
         }

@@ -2,12 +2,6 @@
 
 use core::fmt::Debug;
 
-use crate::{
-    bits::SignRows,
-    mesher::{MeshError, Meshing},
-    simd::{Backend, Simd, dispatch},
-};
-
 /// The sample at one lattice point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Voxel<W = i16> {
@@ -54,13 +48,7 @@ pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private:
 
 /// What the passes need of a weight, out of the users' reach.
 pub(crate) mod private {
-    use crate::{
-        bits::SignRows,
-        mesher::{MeshError, Meshing},
-        simd::{Backend, Simd},
-    };
-
-    pub trait Sealed: Sized + Copy {
+    pub trait Sealed: Sized + Copy + 'static {
         /// The isovalue in this weight's own terms, so that [`Sealed::inside`] is one comparison.
         type Threshold: Copy;
         /// Weights and their differences, without loss (for `f32`: what `f32` makes of them).
@@ -69,8 +57,6 @@ pub(crate) mod private {
         fn threshold(isovalue: f32) -> Self::Threshold;
         /// Whether the sample lies below the isovalue.
         fn inside(self, threshold: Self::Threshold) -> bool;
-        /// The same for 32 samples, a bit each.
-        fn below<S: Simd>(weights: &[Self; 32], threshold: Self::Threshold) -> u32;
         fn wide(self) -> Self::Wide;
         /// `a − b` in steps, for gradients; may be infinite or NaN.
         fn difference(a: Self, b: Self) -> Self::Wide;
@@ -94,16 +80,26 @@ pub(crate) mod private {
         fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
         /// The sample as a finite number, for the rare gradients that overflow.
         fn finite(self) -> f64;
-        /// Meshes slabs. Here, and not generic, so that the passes are compiled in this crate, once, with its level of
-        /// optimisation.
-        fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError>;
-        /// Packs signs, here for the same reason.
-        fn pack(backend: Backend, rows: SignRows<'_, Self>);
+        /// Calls the function for this type of weights.
+        fn call<F: PerWeight>(arguments: F::Arguments<'_, Self>) -> F::Output;
+    }
+
+    /// A function that each type of weights has a body of its own for.
+    ///
+    /// The passes that need one define it, so that weights know nothing of them; and a body that is not generic is
+    /// compiled in this crate, once, with its level of optimisation. (Refused: a method of [`Sealed`] for each function,
+    /// which would name all passes here, and supertraits of `Weight`, which would too.)
+    pub trait PerWeight {
+        type Arguments<'a, W: Sealed>;
+        type Output;
+        fn of_i8(arguments: Self::Arguments<'_, i8>) -> Self::Output;
+        fn of_i16(arguments: Self::Arguments<'_, i16>) -> Self::Output;
+        fn of_f32(arguments: Self::Arguments<'_, f32>) -> Self::Output;
     }
 }
 
 macro_rules! integer_weight {
-    ($type:ty, $scale:literal, $below:ident, $pair:ty) => {
+    ($type:ty, $scale:literal, $of:ident, $pair:ty) => {
         impl Weight for $type {
             const SCALE: f32 = $scale;
             const OUTSIDE: Self = <$type>::MAX;
@@ -145,11 +141,6 @@ macro_rules! integer_weight {
             #[inline(always)]
             fn inside(self, (threshold, all): Self::Threshold) -> bool {
                 (self < threshold) | all
-            }
-
-            #[inline(always)]
-            fn below<S: Simd>(weights: &[Self; 32], (threshold, all): Self::Threshold) -> u32 {
-                S::$below(weights, threshold) | if all { u32::MAX } else { 0 }
             }
 
             type Wide = i32;
@@ -215,19 +206,16 @@ macro_rules! integer_weight {
                 f64::from(self)
             }
 
-            fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError> {
-                dispatch(backend, meshing)
-            }
-
-            fn pack(backend: Backend, rows: SignRows<'_, Self>) {
-                dispatch(backend, rows);
+            #[inline(always)]
+            fn call<F: private::PerWeight>(arguments: F::Arguments<'_, Self>) -> F::Output {
+                F::$of(arguments)
             }
         }
     };
 }
 
-integer_weight!(i8, 32.0, below_i8, u16);
-integer_weight!(i16, 256.0, below_i16, u32);
+integer_weight!(i8, 32.0, of_i8, u16);
+integer_weight!(i16, 256.0, of_i16, u32);
 
 impl Weight for f32 {
     const SCALE: f32 = 1.0;
@@ -253,11 +241,6 @@ impl private::Sealed for f32 {
     #[inline(always)]
     fn inside(self, threshold: f32) -> bool {
         self < threshold
-    }
-
-    #[inline(always)]
-    fn below<S: Simd>(weights: &[Self; 32], threshold: f32) -> u32 {
-        S::below_f32(weights, threshold)
     }
 
     type Wide = f32;
@@ -330,12 +313,9 @@ impl private::Sealed for f32 {
         if self.is_nan() { f64::from(Self::MAX) } else { f64::from(self.clamp(Self::MIN, Self::MAX)) }
     }
 
-    fn mesh(backend: Backend, meshing: Meshing<'_, Self>) -> Result<(), MeshError> {
-        dispatch(backend, meshing)
-    }
-
-    fn pack(backend: Backend, rows: SignRows<'_, Self>) {
-        dispatch(backend, rows);
+    #[inline(always)]
+    fn call<F: private::PerWeight>(arguments: F::Arguments<'_, Self>) -> F::Output {
+        F::of_f32(arguments)
     }
 }
 

@@ -13,9 +13,11 @@
 //! - `fearless_simd`: 1.4 to 2.9 ns; as fast as this where its `kernel!` leads to the same intrinsics, which is then
 //!   all that it would be needed for.
 
-use core::mem::MaybeUninit;
+use core::{marker::PhantomData, mem::MaybeUninit};
 
 use crate::cell::Face;
+use crate::sample::Weight;
+use crate::sample::private::{PerWeight, Sealed};
 
 mod portable;
 mod words;
@@ -131,7 +133,7 @@ pub(crate) fn dispatch_words<J: Job>(backend: Backend, job: J) -> J::Output {
 }
 
 /// What the backends do each in their way. [`portable`] is the plain version that the tests hold the others to.
-pub trait Simd {
+pub(crate) trait Simd {
     /// Eight words in registers.
     type Eight: Eight;
 
@@ -203,6 +205,35 @@ pub trait Simd {
     ) -> usize;
 }
 
+/// Whether each of 32 samples lies below the isovalue: a bit each.
+#[inline(always)]
+pub(crate) fn below<S: Simd, W: Weight>(weights: &[W; 32], threshold: W::Threshold) -> u32 {
+    W::call::<Below<S>>((weights, threshold))
+}
+
+/// [`below`], by type of weights.
+struct Below<S>(PhantomData<S>);
+
+impl<S: Simd> PerWeight for Below<S> {
+    type Arguments<'a, W: Sealed> = (&'a [W; 32], W::Threshold);
+    type Output = u32;
+
+    #[inline(always)]
+    fn of_i8((weights, (threshold, all)): (&[i8; 32], (i8, bool))) -> u32 {
+        S::below_i8(weights, threshold) | if all { u32::MAX } else { 0 }
+    }
+
+    #[inline(always)]
+    fn of_i16((weights, (threshold, all)): (&[i16; 32], (i16, bool))) -> u32 {
+        S::below_i16(weights, threshold) | if all { u32::MAX } else { 0 }
+    }
+
+    #[inline(always)]
+    fn of_f32((weights, threshold): (&[f32; 32], f32)) -> u32 {
+        S::below_f32(weights, threshold)
+    }
+}
+
 /// Exchanges the high part of each word with the low part of the word `APART` behind it: what `low` selects there, and
 /// `SHIFT` further up here.
 #[inline(always)]
@@ -216,7 +247,7 @@ fn swap_blocks<const APART: usize, const SHIFT: u32>(words: [u64; 8], low: u64) 
 
 /// Eight words that are treated at once, in lanes 0–7. For loops that keep them from one step to the next: those are not
 /// vectorised by the compiler.
-pub trait Eight: Copy {
+pub(crate) trait Eight: Copy {
     fn load(words: &[u64; 8]) -> Self;
     fn store(self, words: &mut [u64; 8]);
 
@@ -253,7 +284,7 @@ pub(crate) const CODES: usize = 1024;
 /// What a cell of some code adds to the mesh, in half a cache line. See `mesher/triangles.rs`, which derives them.
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
-pub struct Recipe {
+pub(crate) struct Recipe {
     /// For each of up to 15 indices: bits 0–2 name the counter, bit 3 is set where the vertex lies on the high side of
     /// the cell, bit 4 where it is the one behind the counter's.
     pub vertices: [u8; 16],

@@ -4,16 +4,46 @@ use super::BitGrid;
 use crate::{
     lattice::Samples,
     mesher::sign_row,
-    sample::Weight,
-    simd::{Job, Simd},
+    sample::{
+        Weight,
+        private::{PerWeight, Sealed},
+    },
+    simd::{Backend, Job, Simd, dispatch},
 };
 
 /// Samples whose signs become a grid.
-pub struct SignRows<'a, W> {
+pub(super) struct SignRows<'a, W> {
     pub(super) samples: Samples<'a, W>,
     pub(super) padding: usize,
     pub(super) isovalue: f32,
     pub(super) grid: &'a mut BitGrid,
+}
+
+impl<W: Weight> SignRows<'_, W> {
+    /// Packs them with `backend`.
+    pub(super) fn pack(self, backend: Backend) {
+        W::call::<OnBackend>((backend, self));
+    }
+}
+
+/// [`SignRows::pack`], by type of weights.
+struct OnBackend;
+
+impl PerWeight for OnBackend {
+    type Arguments<'a, W: Sealed> = (Backend, SignRows<'a, W>);
+    type Output = ();
+
+    fn of_i8((backend, rows): (Backend, SignRows<'_, i8>)) {
+        dispatch(backend, rows);
+    }
+
+    fn of_i16((backend, rows): (Backend, SignRows<'_, i16>)) {
+        dispatch(backend, rows);
+    }
+
+    fn of_f32((backend, rows): (Backend, SignRows<'_, f32>)) {
+        dispatch(backend, rows);
+    }
 }
 
 impl<W: Weight> Job for SignRows<'_, W> {

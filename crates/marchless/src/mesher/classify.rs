@@ -3,7 +3,10 @@
 use alloc::vec::Vec;
 
 use super::slabs::Lattice;
-use crate::{sample::Weight, simd::Simd};
+use crate::{
+    sample::Weight,
+    simd::{self, Simd},
+};
 
 /// The signs of one slab: `words` a row, rows one after the other.
 #[derive(Clone, Debug, Default)]
@@ -110,7 +113,7 @@ pub(super) fn alike<S: Simd, W: Weight>(samples: &[W], threshold: W::Threshold) 
     for (index, group) in groups.iter().enumerate() {
         let mut others = 0;
         for weights in group.as_chunks::<32>().0 {
-            others |= W::below::<S>(weights, threshold) ^ expected;
+            others |= simd::below::<S, W>(weights, threshold) ^ expected;
         }
         if others != 0 {
             return 128 * index;
@@ -118,11 +121,11 @@ pub(super) fn alike<S: Simd, W: Weight>(samples: &[W], threshold: W::Threshold) 
     }
     let mut others = 0;
     for weights in rest.as_chunks::<32>().0 {
-        others |= W::below::<S>(weights, threshold) ^ expected;
+        others |= simd::below::<S, W>(weights, threshold) ^ expected;
     }
     match samples.last_chunk::<32>() {
         // Some of these once more.
-        Some(last) => others |= W::below::<S>(last, threshold) ^ expected,
+        Some(last) => others |= simd::below::<S, W>(last, threshold) ^ expected,
         None => others |= u32::from(rest.iter().any(|weight| weight.inside(threshold) != inside)),
     }
     samples.len() - if others == 0 { 0 } else { rest.len() }
@@ -146,18 +149,18 @@ fn sign_word<S: Simd, W: Weight>(samples: &[W], count: usize, threshold: W::Thre
         if let Some((low, rest)) = samples.split_first_chunk::<32>()
             && let Some(last) = rest.first()
         {
-            return u64::from(W::below::<S>(low, threshold)) | u64::from(last.inside(threshold)) << 32;
+            return u64::from(simd::below::<S, W>(low, threshold)) | u64::from(last.inside(threshold)) << 32;
         }
     } else if count > 32 {
         if let Some(samples) = samples.first_chunk::<64>() {
             let mut signs = 0;
             for (half, samples) in samples.as_chunks::<32>().0.iter().enumerate() {
-                signs |= u64::from(W::below::<S>(samples, threshold)) << (32 * half);
+                signs |= u64::from(simd::below::<S, W>(samples, threshold)) << (32 * half);
             }
             return signs & mask;
         }
     } else if let Some(samples) = samples.first_chunk::<32>() {
-        return u64::from(W::below::<S>(samples, threshold)) & mask;
+        return u64::from(simd::below::<S, W>(samples, threshold)) & mask;
     }
     few(&samples[..count], threshold)
 }

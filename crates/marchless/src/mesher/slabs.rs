@@ -12,8 +12,11 @@ use super::{
 use crate::{
     buffer::MeshBuffer,
     lattice::{Samples, Shape},
-    sample::Weight,
-    simd::{Job, Simd},
+    sample::{
+        Weight,
+        private::{PerWeight, Sealed},
+    },
+    simd::{Backend, Job, Simd, dispatch},
 };
 
 /// How the samples of a slab lie in memory, and how their signs are packed.
@@ -234,7 +237,7 @@ pub(super) enum Place {
 }
 
 /// Slabs to be meshed.
-pub struct Meshing<'a, W> {
+pub(super) struct Meshing<'a, W> {
     pub(super) input: Input<'a, W>,
     pub(super) lattice: Lattice,
     pub(super) settings: &'a MeshSettings,
@@ -248,6 +251,33 @@ pub(super) enum Input<'a, W> {
     Volume { samples: Samples<'a, W>, cells: Range<usize> },
     /// One slab of many that come one by one, and whether another one will come.
     Stream { window: Window<'a, W>, has_next: bool },
+}
+
+impl<W: Weight> Meshing<'_, W> {
+    /// Meshes them with `backend`.
+    pub(super) fn on(self, backend: Backend) -> Result<(), MeshError> {
+        W::call::<OnBackend>((backend, self))
+    }
+}
+
+/// [`Meshing::on`], by type of weights.
+struct OnBackend;
+
+impl PerWeight for OnBackend {
+    type Arguments<'a, W: Sealed> = (Backend, Meshing<'a, W>);
+    type Output = Result<(), MeshError>;
+
+    fn of_i8((backend, meshing): (Backend, Meshing<'_, i8>)) -> Self::Output {
+        dispatch(backend, meshing)
+    }
+
+    fn of_i16((backend, meshing): (Backend, Meshing<'_, i16>)) -> Self::Output {
+        dispatch(backend, meshing)
+    }
+
+    fn of_f32((backend, meshing): (Backend, Meshing<'_, f32>)) -> Self::Output {
+        dispatch(backend, meshing)
+    }
 }
 
 impl<W: Weight> Job for Meshing<'_, W> {

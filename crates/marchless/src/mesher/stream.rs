@@ -126,7 +126,7 @@ impl<W: Weight> SlabMesher<W> {
         };
         let input = Input::Stream { window, has_next: z < last };
         let (settings, slabs) = (&self.settings, &mut self.slabs);
-        W::mesh(self.backend, Meshing { input, lattice: self.lattice, settings, slabs, out })
+        Meshing { input, lattice: self.lattice, settings, slabs, out }.on(self.backend)
     }
 }
 

@@ -76,7 +76,7 @@ impl ThreadedMesher {
             while let Some((part, out)) = next(&queue) {
                 out.clear();
                 let input = Input::Volume { samples, cells: start_of(part)..start_of(part + 1) };
-                W::mesh(backend, Meshing { input, lattice, settings, slabs, out })?;
+                Meshing { input, lattice, settings, slabs, out }.on(backend)?;
             }
             Ok(())
         };
