@@ -24,6 +24,14 @@ pub const TRIANGLE_COUNTS: [u8; 256] = CASES.counts;
 /// [`TRIANGLE_COUNTS`] entries count, the others are edge 0 three times.
 pub static TRIANGLES: [[[Edge; 3]; 5]; 256] = CASES.triangles;
 
+impl CaseIndex {
+    /// The triangles of this case, each corner named by the edge that it lies on.
+    pub const fn triangles(self) -> &'static [[Edge; 3]] {
+        let (used, _) = TRIANGLES[self.0 as usize].split_at(TRIANGLE_COUNTS[self.0 as usize] as usize);
+        used
+    }
+}
+
 /// The two corners of each edge, the lower first.
 pub const EDGE_CORNERS: [[Corner; 2]; 12] = {
     let (mut corners, mut edge) = ([Edge::ALL[0].corners(); 12], 0);

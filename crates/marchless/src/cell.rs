@@ -187,13 +187,6 @@ impl CaseIndex {
             && self.is_inside(b) == self.is_inside(d)
             && self.is_inside(a) != self.is_inside(b)
     }
-
-    /// The triangles of this case, each corner named by the edge that it lies on.
-    pub const fn triangles(self) -> &'static [[Edge; 3]] {
-        let (used, _) =
-            crate::cases::TRIANGLES[self.0 as usize].split_at(crate::cases::TRIANGLE_COUNTS[self.0 as usize] as usize);
-        used
-    }
 }
 
 #[cfg(test)]

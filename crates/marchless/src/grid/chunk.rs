@@ -61,9 +61,20 @@ impl<W: Weight> Chunk<W> {
         cells: u32,
         spacing: f64,
     ) -> (Self, bool) {
-        if let Some(chunk) = Self::without_sampling(source, position, cells, spacing) {
-            return (chunk, false);
+        match Self::without_sampling(source, position, cells, spacing) {
+            Some(chunk) => (chunk, false),
+            None => Self::from_uncertain_source(source, position, cells, spacing),
         }
+    }
+
+    /// Steps 3 and 4 of [`Chunk::from_source`], for callers that have done the others: its result where
+    /// [`Chunk::without_sampling`] gives `None`, and whether it took sampling. Arguments as there.
+    pub fn from_uncertain_source(
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        cells: u32,
+        spacing: f64,
+    ) -> (Self, bool) {
         let region = source_region(position, 1, cells, spacing);
         match Self::from_bound(source.bound_closely(&region)) {
             Some(chunk) => (chunk, false),
