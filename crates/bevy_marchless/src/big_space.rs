@@ -53,8 +53,9 @@
 use ::big_space::precision::GridPrecision;
 use ::big_space::prelude::{CellCoord, Grid, GridDirtyTick, Stationary};
 use bevy_app::{App, Plugin, PostUpdate};
+use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
-use bevy_math::{DAffine3, DVec3, IVec3, Vec3};
+use bevy_math::{DVec3, IVec3, Vec3};
 use bevy_transform::components::Transform;
 
 use crate::chunk::{Chunk, chunk_transform};
@@ -70,14 +71,8 @@ impl Plugin for BigSpacePlugin {
         app.add_observer(place_new_chunk)
             .add_observer(place_in_new_grid)
             .add_observer(leave_removed_grid)
-            .add_systems(PostUpdate, follow_settings.in_set(MarchlessSystems::Work).after(MarchlessSystems::Mesh));
+            .add_systems(PostUpdate, follow_settings.in_set(MarchlessSystems::Decorate));
     }
-}
-
-/// From the space of a grid to world space, which is relative to the floating origin's cell.
-pub(crate) fn grid_to_world(grid: &Grid) -> DAffine3 {
-    let origin = grid.local_floating_origin();
-    origin.grid_transform() * DAffine3::from_translation(-grid.cell_to_float(&origin.cell()))
 }
 
 /// A chunk gets its cell as soon as it is there. It never moves, so that propagation may pass over it.
@@ -111,14 +106,21 @@ fn place_in_new_grid(
     }
 }
 
-/// Chunks move where the size of a chunk or of a voxel changes.
+/// Chunks move where the size of a voxel changes. How large it was is remembered, since settings may take effect later.
 fn follow_settings(
-    terrains: Query<(&TerrainVolume, &Grid, &Children), Changed<Terrain>>,
+    terrains: Query<(Entity, &TerrainVolume, &Grid, &Children)>,
     chunks: Query<Placed>,
+    mut sizes: Local<EntityHashMap<f32>>,
     mut commands: Commands,
 ) {
-    for (volume, grid, children) in &terrains {
-        place_again(volume, grid, children, &chunks, &mut commands);
+    for (terrain, volume, grid, children) in &terrains {
+        let Some(settings) = volume.settings() else { continue };
+        if sizes.insert(terrain, settings.voxel_size).is_some_and(|before| before != settings.voxel_size) {
+            place_again(volume, grid, children, &chunks, &mut commands);
+        }
+    }
+    if sizes.len() > terrains.iter().len() {
+        sizes.retain(|terrain, _| terrains.contains(*terrain));
     }
 }
 

@@ -5,6 +5,7 @@ mod part;
 mod piece;
 mod snapshot;
 
+use bevy_app::{App, Plugin};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_math::{DVec3, IVec3};
@@ -14,9 +15,9 @@ use thiserror::Error;
 
 use crate::brush::TerrainEdited;
 use crate::mesh::ChunkSamples;
-use crate::terrain::{Terrain, TerrainVolume};
-pub(crate) use cache::BitsCache;
-use part::{Part, parts, within};
+use crate::terrain::TerrainVolume;
+use cache::BitsCache;
+use part::{Ground, Part, parts, within};
 pub use piece::Piece;
 pub use snapshot::BitsSnapshot;
 
@@ -54,10 +55,20 @@ pub use snapshot::BitsSnapshot;
 /// ```
 #[derive(SystemParam)]
 pub struct TerrainBits<'w, 's> {
-    terrains: Query<'w, 's, &'static TerrainVolume>,
+    terrains: Query<'w, 's, (&'static TerrainVolume, &'static BitsCache)>,
 }
 
-/// What a way leads through.
+/// Keeps the bits that have been asked for, as [`TerrainBits`] needs it.
+#[derive(Default)]
+pub struct BitsPlugin;
+
+impl Plugin for BitsPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_required_components::<TerrainVolume, BitsCache>();
+    }
+}
+
+/// The medium that a path must stay inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Medium {
     /// What is solid.
@@ -76,11 +87,11 @@ impl TerrainBits<'_, '_> {
     /// # Errors
     /// [`TerrainBitsError::NoTerrain`], [`TerrainBitsError::NotFilled`].
     pub fn is_solid(&self, terrain: Entity, region: Region) -> Result<bool, TerrainBitsError> {
-        let (volume, isovalue) = self.volume(terrain)?;
-        if region.is_empty() || within(volume, region) != region {
+        let ground = self.ground(terrain)?;
+        if region.is_empty() || within(ground.grid, region) != region {
             return Ok(region.is_empty());
         }
-        for part in parts(volume, isovalue, region) {
+        for part in parts(ground, region) {
             if !part?.is_solid()? {
                 return Ok(false);
             }
@@ -177,8 +188,10 @@ impl TerrainBits<'_, '_> {
     /// # Errors
     /// [`TerrainBitsError::NoTerrain`].
     pub fn samples(&self, terrain: Entity, piece: &Piece) -> Result<ChunkSamples, TerrainBitsError> {
-        let (volume, settings) = self.accepted(terrain)?;
-        Ok(piece.samples(volume, settings))
+        let no_terrain = TerrainBitsError::NoTerrain { entity: terrain };
+        let (volume, _) = self.terrains.get(terrain).map_err(|_| no_terrain)?;
+        let settings = volume.settings().ok_or(no_terrain)?;
+        Ok(piece.samples(volume.grid(), settings))
     }
 
     /// A box as it is now, to be asked [in a task](BitsSnapshot::in_task). Takes a fraction of a microsecond a chunk.
@@ -186,9 +199,9 @@ impl TerrainBits<'_, '_> {
     /// # Errors
     /// As [`TerrainBits::is_solid`].
     pub fn snapshot(&self, terrain: Entity, region: Region) -> Result<BitsSnapshot, TerrainBitsError> {
-        let (volume, isovalue) = self.volume(terrain)?;
-        let parts = parts(volume, isovalue, region).collect::<Result<_, _>>()?;
-        Ok(BitsSnapshot { region, inside: within(volume, region), parts })
+        let ground = self.ground(terrain)?;
+        let parts = parts(ground, region).collect::<Result<_, _>>()?;
+        Ok(BitsSnapshot { region, inside: within(ground.grid, region), parts })
     }
 
     fn any_part(
@@ -197,8 +210,8 @@ impl TerrainBits<'_, '_> {
         region: Region,
         question: impl Fn(&Part) -> Result<bool, TerrainBitsError>,
     ) -> Result<bool, TerrainBitsError> {
-        let (volume, isovalue) = self.volume(terrain)?;
-        for part in parts(volume, isovalue, region) {
+        let ground = self.ground(terrain)?;
+        for part in parts(ground, region) {
             if question(&part?)? {
                 return Ok(true);
             }
@@ -207,16 +220,11 @@ impl TerrainBits<'_, '_> {
     }
 
     /// The terrain's samples, and the isovalue in effect.
-    fn volume(&self, terrain: Entity) -> Result<(&TerrainVolume, f32), TerrainBitsError> {
-        let (volume, settings) = self.accepted(terrain)?;
-        Ok((volume, settings.isovalue))
-    }
-
-    /// The terrain's samples and the settings in effect.
-    fn accepted(&self, terrain: Entity) -> Result<(&TerrainVolume, &Terrain), TerrainBitsError> {
-        let volume = self.terrains.get(terrain).ok();
-        let with_settings = volume.and_then(|volume| Some((volume, volume.settings()?)));
-        with_settings.ok_or(TerrainBitsError::NoTerrain { entity: terrain })
+    fn ground(&self, terrain: Entity) -> Result<Ground<'_>, TerrainBitsError> {
+        let no_terrain = TerrainBitsError::NoTerrain { entity: terrain };
+        let (volume, cache) = self.terrains.get(terrain).map_err(|_| no_terrain)?;
+        let settings = volume.settings().ok_or(no_terrain)?;
+        Ok(Ground { grid: volume.grid(), cache, isovalue: settings.isovalue })
     }
 }
 

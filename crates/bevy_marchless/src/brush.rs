@@ -11,9 +11,7 @@ use bevy_math::{DVec3, IVec3, Vec3};
 use bevy_reflect::prelude::*;
 use marchless::BrushError;
 
-pub(crate) use apply::{StampQueue, apply_waiting_stamps};
-
-use crate::schedule::MarchlessSystems;
+use crate::schedule::{MarchlessSystems, NewEdits, Phase};
 use crate::stats::count_update;
 
 /// One application of a brush to a terrain, asked for by a message.
@@ -184,8 +182,9 @@ impl Stroke {
     }
 }
 
-/// What the stamps of one update have changed of a terrain; sent in the update that applied them.
+/// What the stamps of one update have changed of one region of a terrain; sent in the update that applied them.
 ///
+/// Stamps whose chunks overlap are one region; of others, each has a message of its own.
 /// Stamps on chunks that are still being filled are reported when they take effect.
 #[derive(Message, Reflect, Clone, Debug, PartialEq, Eq)]
 #[reflect(Message, Debug, PartialEq, Clone)]
@@ -212,8 +211,9 @@ impl Plugin for BrushPlugin {
             .add_message::<TerrainEdited>()
             .register_type::<Stamp>()
             .register_type::<TerrainEdited>()
-            .init_resource::<StampQueue>()
+            .init_resource::<NewEdits>()
+            .init_resource::<apply::StampQueue>()
             .add_systems(PostUpdate, apply::read_stamps.after(count_update).in_set(MarchlessSystems::ReadStamps))
-            .add_systems(PostUpdate, (apply::apply_stamps, apply::report_edits).chain().in_set(MarchlessSystems::Edit));
+            .add_systems(PostUpdate, apply::apply_stamps.in_set(Phase::Edit));
     }
 }

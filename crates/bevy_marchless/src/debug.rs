@@ -10,10 +10,11 @@ use bevy_ecs::prelude::*;
 #[cfg(feature = "gizmos")]
 pub use gizmos::{ChunkBoundsGizmos, ShowChunkBounds};
 
+use crate::budget::FrameBudget;
 use crate::chunk::ChunkGeometry;
 use crate::mesh::geometry_bytes;
-use crate::schedule::MarchlessSystems;
-use crate::stats::{MainThread, Stats};
+use crate::schedule::Phase;
+use crate::stats::TerrainStats;
 use crate::terrain::TerrainVolume;
 
 /// Measures the plugin's work in Bevy's `DiagnosticsStore`, and with the feature `gizmos` draws the bounds of chunks.
@@ -64,7 +65,7 @@ impl Plugin for DebugPlugin {
             app.register_diagnostic(Diagnostic::new(path).with_suffix(suffix));
         }
         app.init_resource::<Drawn>().add_observer(add_geometry).add_observer(take_away_geometry);
-        app.add_systems(PostUpdate, measure.in_set(MarchlessSystems::Report));
+        app.add_systems(PostUpdate, measure.in_set(Phase::Report));
         #[cfg(feature = "gizmos")]
         gizmos::build(app);
     }
@@ -107,66 +108,84 @@ fn take_away_geometry(
     }
 }
 
-/// Going through a volume's samples, a part in each update.
+/// Going through the samples of all terrains, a part in each update.
 #[derive(Default)]
 struct Sweep {
-    next: Option<[i32; 3]>,
-    so_far: usize,
-    /// What the last one that is complete found. Unit: bytes.
-    found: Option<usize>,
+    /// The terrain that is being gone through, from which position on, and what has been found of it.
+    at: Option<(Entity, [i32; 3], usize)>,
+    /// What the last sweep over each terrain that is complete found. Unit: bytes.
+    found: EntityHashMap<usize>,
 }
 
-/// So many chunks of a volume are looked at per update.
+/// This many chunks are looked at per update.
 const SWEPT: usize = 32;
 
 impl Sweep {
-    fn go_on(&mut self, volume: &TerrainVolume) {
-        let (bytes, next) = volume.sample_bytes_from(self.next.unwrap_or([i32::MIN; 3]), SWEPT);
-        (self.so_far, self.next) = (self.so_far + bytes, next);
-        if next.is_none() {
-            self.found = Some(core::mem::take(&mut self.so_far));
+    /// Goes on; where a terrain ends, the next one begins.
+    fn go_on(&mut self, volumes: &Query<(Entity, &TerrainVolume)>) {
+        if self.found.len() > volumes.iter().len() {
+            self.found.retain(|terrain, _| volumes.contains(*terrain));
         }
+        let next = |after: Option<Entity>| {
+            let later = volumes.iter().map(|(terrain, _)| terrain).filter(|terrain| Some(*terrain) > after);
+            later.min().map(|terrain| (terrain, [i32::MIN; 3], 0))
+        };
+        let at = self.at.filter(|(terrain, ..)| volumes.contains(*terrain));
+        let Some((terrain, from, so_far)) = at.or_else(|| next(None)) else { return };
+        let Ok((_, volume)) = volumes.get(terrain) else { return };
+        let (bytes, rest) = volume.heart().sample_bytes_from(from, SWEPT);
+        let bytes = so_far + bytes;
+        self.at = match rest {
+            Some(rest) => Some((terrain, rest, bytes)),
+            None => {
+                self.found.insert(terrain, bytes);
+                next(Some(terrain))
+            }
+        };
     }
 }
 
 fn measure(
     volumes: Query<(Entity, &TerrainVolume)>,
     drawn: Res<Drawn>,
-    mut sweeps: Local<EntityHashMap<Sweep>>,
-    mut stats: ResMut<Stats>,
-    main_thread: Res<MainThread>,
+    mut sweep: Local<Sweep>,
+    mut before: Local<TerrainStats>,
+    stats: Res<TerrainStats>,
+    budget: Res<FrameBudget>,
     mut diagnostics: Diagnostics,
 ) {
     let chunks = f64::from(drawn.chunks);
     diagnostics.add_measurement(&DebugPlugin::CHUNKS, || chunks);
     diagnostics.add_measurement(&DebugPlugin::TRIANGLES, || drawn.triangles as f64);
-    let all = |of: fn(&TerrainVolume) -> usize| volumes.iter().map(|(_, volume)| of(volume)).sum::<usize>() as f64;
-    diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || all(|volume| volume.unfilled));
-    diagnostics.add_measurement(&DebugPlugin::MESH_QUEUE, || all(TerrainVolume::waiting_for_meshes));
-    diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || all(TerrainVolume::waiting));
-    let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
-    diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(main_thread.so_far()));
-    sweeps.retain(|terrain, _| volumes.contains(*terrain));
-    let mut samples = Some(0);
-    for (terrain, volume) in &volumes {
-        let sweep = sweeps.entry(terrain).or_default();
-        sweep.go_on(volume);
-        samples = samples.zip(sweep.found).map(|(samples, found)| samples + found + volume.notes_bytes());
+    let (mut to_fill, mut to_mesh, mut to_come, mut notes) = (0, 0, 0, 0);
+    for (_, volume) in &volumes {
+        let heart = volume.heart();
+        to_fill += heart.waiting_for_samples();
+        to_mesh += heart.waiting_for_meshes();
+        to_come += heart.waiting_to_come();
+        notes += heart.notes_bytes();
     }
-    if let Some(samples) = samples {
-        let bytes = (samples + drawn.bytes) as f64;
+    diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || to_fill as f64);
+    diagnostics.add_measurement(&DebugPlugin::MESH_QUEUE, || to_mesh as f64);
+    diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || (to_come + to_fill + to_mesh) as f64);
+    let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
+    diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(budget.spent()));
+    sweep.go_on(&volumes);
+    if sweep.found.len() == volumes.iter().len() {
+        let bytes = (sweep.found.values().sum::<usize>() + notes + drawn.bytes) as f64;
         diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes);
         if drawn.chunks > 0 {
             diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes / chunks);
         }
     }
-    let meshed = core::mem::take(&mut stats.meshed);
-    let mesh_time = core::mem::take(&mut stats.mesh_time);
+    let meshed = stats.meshed - before.meshed;
     if meshed > 0 {
-        diagnostics.add_measurement(&DebugPlugin::MESH_TIME, || milliseconds(mesh_time) / f64::from(meshed));
+        let mesh_time = milliseconds(stats.mesh_time - before.mesh_time);
+        diagnostics.add_measurement(&DebugPlugin::MESH_TIME, || mesh_time / meshed as f64);
     }
-    if let Some((updates, time)) = stats.edit_to_visible.take() {
-        diagnostics.add_measurement(&DebugPlugin::EDIT_UPDATES, || updates as f64);
-        diagnostics.add_measurement(&DebugPlugin::EDIT_TIME, || milliseconds(time));
+    if stats.edits_shown > before.edits_shown {
+        diagnostics.add_measurement(&DebugPlugin::EDIT_UPDATES, || stats.edit_updates_last as f64);
+        diagnostics.add_measurement(&DebugPlugin::EDIT_TIME, || milliseconds(stats.edit_time_last));
     }
+    *before = *stats;
 }

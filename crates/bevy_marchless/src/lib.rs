@@ -31,11 +31,12 @@
 //! [`Chunk`](chunk::Chunk) entities, its children, mirror what is drawn. All chunks that an edit changes are
 //! meshed from one snapshot and shown in one update, a small edit in the update that reads its stamp. A
 //! [`TerrainQuery`](query::TerrainQuery) tells what a ray hits. Everything runs in `PostUpdate`
-//! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame.
+//! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame. What games add to
+//! chunks belongs in [`MarchlessSystems::Decorate`](schedule::MarchlessSystems::Decorate).
 //!
 //! # What is guaranteed
-//! - The same stamps in the same order give the same samples, bit for bit, on any machine, whatever the threads do; what a
-//!   source gives is up to its floating point.
+//! - The same stamps in the same order give the same samples, bit for bit, on any machine, whatever the threads do and
+//!   wherever viewers are; what a source gives is up to its floating point.
 //! - Neighbouring chunks share their borders bit for bit, and never show different states of an edit.
 //! - Bad settings, stamps, rays and sources that panic are refused or reported; the game goes on.
 //!
@@ -56,8 +57,11 @@
 pub mod big_space;
 pub mod bits;
 pub mod brush;
+mod budget;
 pub mod chunk;
+mod cover;
 pub mod debug;
+mod jobs;
 #[cfg(feature = "pbr")]
 pub mod material;
 pub mod mesh;
@@ -65,10 +69,10 @@ mod place;
 pub mod query;
 pub mod schedule;
 pub mod source;
-mod stats;
+pub mod stats;
 pub mod stream;
 pub mod terrain;
-mod work;
+mod volume;
 #[cfg(feature = "world_files")]
 pub mod world;
 
@@ -91,7 +95,8 @@ pub mod prelude {
     pub use crate::query::{TerrainHit, TerrainQuery};
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
     pub use crate::source::*;
-    pub use crate::stream::{Coverage, Leaf, LeafState, StreamStats, TerrainViewer};
+    pub use crate::stats::TerrainStats;
+    pub use crate::stream::{Coverage, Leaf, LeafState, TerrainViewer};
     pub use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainError, TerrainVolume};
     #[cfg(feature = "world_files")]
     pub use crate::world::{TerrainWorld, WorldDescription, WorldSource};
@@ -105,6 +110,9 @@ plugin_group! {
     pub struct MarchlessPlugins {
         schedule:::SchedulePlugin,
         terrain:::TerrainPlugin,
+        stream:::StreamPlugin,
+        query:::QueryPlugin,
+        bits:::BitsPlugin,
         brush:::BrushPlugin,
         mesh:::MeshingPlugin,
         #[cfg(feature = "pbr")]

@@ -11,7 +11,7 @@ use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
 
 use crate::chunk::Chunk;
 use crate::mesh::ChunkSamples;
-use crate::schedule::MarchlessSystems;
+use crate::schedule::{MarchlessSystems, Phase};
 use crate::terrain::Terrain;
 
 /// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes.
@@ -30,14 +30,9 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
         let component = app.world_mut().register_component::<MeshMaterial3d<M>>();
         app.init_resource::<MaterialTypes>();
         app.world_mut().resource_mut::<MaterialTypes>().0.push(component);
-        app.add_observer(take_away_material::<M>).add_systems(
-            PostUpdate,
-            // In the update in which a chunk is spawned: without a material it would not be drawn.
-            hand_on_material::<M>
-                .in_set(MarchlessSystems::Work)
-                .after(MarchlessSystems::Mesh)
-                .before(MarchlessSystems::Report),
-        );
+        app.add_observer(take_away_material::<M>)
+            .add_observer(give_material::<M>)
+            .add_systems(PostUpdate, hand_on_material::<M>.in_set(MarchlessSystems::Decorate));
     }
 }
 
@@ -50,7 +45,7 @@ impl Plugin for MaterialPlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins(TerrainMaterialPlugin::<StandardMaterial>::default())
             .add_observer(take_away_plain_material)
-            .add_systems(PostUpdate, give_default_material.in_set(MarchlessSystems::Prepare));
+            .add_systems(PostUpdate, give_default_material.in_set(Phase::Prepare));
     }
 }
 
@@ -96,39 +91,43 @@ fn take_away_plain_material(
     }
 }
 
-/// Gives the chunks of changed terrains, and new chunks, their terrain's material.
-fn hand_on_material<M: Material>(
-    new: Query<(Entity, &Chunk), Added<Chunk>>,
-    chunks: Query<(Entity, &Chunk)>,
+/// A new chunk gets its terrain's material as soon as it is there: without one it would not be drawn.
+fn give_material<M: Material>(
+    added: On<Add, Chunk>,
+    chunks: Query<&Chunk>,
     terrains: Query<&MeshMaterial3d<M>, With<Terrain>>,
-    changed: Query<(), (Changed<MeshMaterial3d<M>>, With<Terrain>)>,
     mut commands: Commands,
 ) {
-    let mut hand_on = |(entity, chunk): (Entity, &Chunk)| {
-        if let Ok(material) = terrains.get(chunk.terrain) {
-            commands.entity(entity).try_insert(MeshMaterial3d(material.0.clone()));
+    if let Ok(chunk) = chunks.get(added.entity)
+        && let Ok(material) = terrains.get(chunk.terrain)
+    {
+        commands.entity(added.entity).try_insert(MeshMaterial3d(material.0.clone()));
+    }
+}
+
+/// Gives the chunks of terrains their new material.
+fn hand_on_material<M: Material>(
+    changed: Query<(&MeshMaterial3d<M>, &Children), (Changed<MeshMaterial3d<M>>, With<Terrain>)>,
+    chunks: Query<Entity, With<Chunk>>,
+    mut commands: Commands,
+) {
+    for (material, children) in &changed {
+        for chunk in chunks.iter_many(children) {
+            commands.entity(chunk).try_insert(MeshMaterial3d(material.0.clone()));
         }
-    };
-    if changed.is_empty() {
-        new.iter().for_each(hand_on);
-    } else {
-        chunks
-            .iter()
-            .filter(|(entity, chunk)| changed.contains(chunk.terrain) || new.contains(*entity))
-            .for_each(&mut hand_on);
     }
 }
 
 /// Chunks lose their material when their terrain does.
 fn take_away_material<M: Material>(
     removed: On<Remove, MeshMaterial3d<M>>,
-    terrains: Query<(), With<Terrain>>,
-    chunks: Query<(Entity, &Chunk)>,
+    terrains: Query<&Children, With<Terrain>>,
+    chunks: Query<Entity, With<Chunk>>,
     mut commands: Commands,
 ) {
-    if terrains.contains(removed.entity) {
-        for (entity, _) in chunks.iter().filter(|(_, chunk)| chunk.terrain == removed.entity) {
-            commands.entity(entity).try_remove::<MeshMaterial3d<M>>();
+    if let Ok(children) = terrains.get(removed.entity) {
+        for chunk in chunks.iter_many(children) {
+            commands.entity(chunk).try_remove::<MeshMaterial3d<M>>();
         }
     }
 }

@@ -5,14 +5,14 @@
 //! edits of claimed chunks wait, become one set, and start from the newest samples when the group is done. So results
 //! come in order by construction, and a stroke that never pauses is shown all along.
 //!
-//! A chunk that has never been drawn is a group of its own, which an edit may withdraw as long as nobody works on it.
+//! A chunk that has never been drawn is a group of its own, which gives way to edits.
 
 mod handmade;
 mod job;
 mod rooms;
 
+use core::cell::Cell;
 use core::time::Duration;
-use std::collections::{BTreeMap, BTreeSet};
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_asset::Assets;
@@ -21,19 +21,20 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_mesh::{Mesh, Mesh3d, MeshVertexAttribute, VertexFormat};
 use bevy_platform::time::Instant;
-use marchless::{Chunk, Grid, MeshBuffer};
+use bevy_tasks::AsyncComputeTaskPool;
+use marchless::MeshBuffer;
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
-pub(crate) use job::{Colors, Meshed};
-use job::{mesh_chunk, mesh_now};
+use job::{mesh_chunk, mesh_now, recolor};
 use rooms::MeshRooms;
 
-use crate::chunk::{ChunkGeometry, ChunkKey, mesh_bounds, new_chunk};
-use crate::schedule::{MarchlessSettings, MarchlessSystems};
-use crate::stats::{MainThread, Stats};
-use crate::stream::{ENTITY_TIME, StreamStats, Wanted, in_flight};
-use crate::terrain::{ChunkState, Group, Pending, TerrainVolume, same_samples};
-use crate::work::{Priority, Results, WorkQueue};
+use crate::budget::{ENTITY_TIME, FrameBudget, Share};
+use crate::chunk::{ChunkGeometry, mesh_bounds, new_chunk};
+use crate::jobs::{Priority, WorkQueue};
+use crate::schedule::{MakesMeshes, MarchlessSettings, Phase};
+use crate::stats::TerrainStats;
+use crate::terrain::TerrainVolume;
+use crate::volume::{Drawn, Heart, MeshResult, Meshed, Place, Prepared, Restyle, Restyled, Shown, Swap};
 
 /// The number of a vertex's material, a `u32`, for shaders.
 pub const ATTRIBUTE_MATERIAL: MeshVertexAttribute =
@@ -45,25 +46,17 @@ pub struct MeshingPlugin;
 
 impl Plugin for MeshingPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<MeshResults>()
-            .init_resource::<handmade::HandmadeResults>()
+        app.init_resource::<MakesMeshes>()
             .init_resource::<MeshRooms>()
             .register_type::<ChunkSamples>()
             .register_type::<NoAutoAabb>()
             .add_observer(handmade::forget_removed_samples)
-            .add_systems(PostUpdate, (mesh_terrains, handmade::mesh_samples).chain().in_set(MarchlessSystems::Mesh));
+            .add_systems(PostUpdate, (mesh_terrains, handmade::mesh_samples).chain().in_set(Phase::Mesh));
     }
 }
 
-/// What the jobs have meshed.
-#[derive(Resource, Default)]
-struct MeshResults(Results<MeshResult>);
-
-struct MeshResult {
-    terrain: Entity,
-    group: u64,
-    meshed: Meshed,
-}
+/// At most this many chunks are meshed within one update for its edits.
+const MOST_INLINE: usize = 1024;
 
 /// What showing a mesh takes.
 #[derive(SystemParam)]
@@ -71,8 +64,7 @@ struct Screen<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
     rooms: Res<'w, MeshRooms>,
-    stats: ResMut<'w, Stats>,
-    stream: ResMut<'w, StreamStats>,
+    stats: ResMut<'w, TerrainStats>,
 }
 
 impl Screen<'_, '_> {
@@ -87,6 +79,13 @@ impl Screen<'_, '_> {
         };
     }
 
+    /// Gives an entity another asset of the mesh that it has.
+    fn show_asset(&mut self, entity: Entity, mesh: Mesh) {
+        if let Some(assets) = &mut self.assets {
+            self.commands.entity(entity).try_insert(Mesh3d(assets.add(mesh)));
+        }
+    }
+
     /// Spawns a chunk with its mesh, which is not empty.
     fn spawn(&mut self, chunk: impl Bundle, meshed: Meshed, cells: [u32; 3]) -> Entity {
         let bounds = mesh_bounds(&meshed.geometry, cells);
@@ -96,65 +95,40 @@ impl Screen<'_, '_> {
         }
         entity.id()
     }
-
-    fn count_mesh(&mut self, time: Duration) {
-        self.stats.count_mesh(time);
-        self.stream.meshed += 1;
-        self.stream.mesh_time += time;
-    }
 }
 
 /// Shows the groups that are complete, and starts new ones.
 fn mesh_terrains(
     mut volumes: Query<(Entity, &mut TerrainVolume)>,
     queue: Res<WorkQueue>,
-    results: Res<MeshResults>,
-    mut waiting: Local<Vec<MeshResult>>,
     settings: Res<MarchlessSettings>,
-    mut main_thread: ResMut<MainThread>,
+    mut budget: ResMut<FrameBudget>,
     mut screen: Screen,
 ) {
-    let start = main_thread.start();
-    let (mut bytes, mut shown, until) = (0, 0, main_thread.until(start, settings.main_thread));
-    waiting.extend(results.0.take());
-    for result in core::mem::take(&mut *waiting) {
-        let MeshResult { terrain, group, .. } = result;
-        let Ok((_, mut volume)) = volumes.get_mut(terrain) else { continue };
-        let Some(unfinished) = volume.groups.get_mut(&group) else { continue };
-        // New chunks may come one by one; an edit is shown as a whole.
-        let now = Instant::now() + shown * ENTITY_TIME;
-        if unfinished.withdrawable && (bytes > settings.upload_bytes || bytes > 0 && now > until) {
-            waiting.push(result);
-            continue;
-        }
-        let meshed = result.meshed;
-        bytes += geometry_bytes(&meshed.geometry);
-        screen.count_mesh(meshed.time);
-        unfinished.meshed.push(meshed);
-        if unfinished.meshed.len() == unfinished.members
-            && let Some(group) = volume.take_group(group)
-        {
-            show_group(terrain, &mut volume, group, &mut screen);
-            shown += 1;
-        }
-    }
-    let until = until.checked_sub(shown * ENTITY_TIME).unwrap_or(until);
+    let start = Instant::now();
+    let threads = AsyncComputeTaskPool::try_get().map_or(1, |pool| pool.thread_num().max(1));
+    let mut update = Update {
+        queue: &queue,
+        screen: &mut screen,
+        until: budget.until(start, Share::Mesh),
+        in_flight: settings.in_flight(threads),
+        inline: settings.inline_chunks,
+        inline_left: MOST_INLINE.max(settings.inline_chunks),
+        upload_bytes: settings.upload_bytes,
+        bytes: 0,
+        edits: Duration::ZERO,
+    };
     for (terrain, mut volume) in &mut volumes {
-        if !volume.ready.is_empty() || !volume.streaming.to_mesh.is_empty() || !volume.pending.is_empty() {
-            let mut start = Start { terrain, queue: &queue, results: &results, screen: &mut screen, inline: 0 };
-            start.inline = settings.inline_chunks;
-            start.pending_chunks(&mut volume);
-            start.inline = 0;
-            start.ready_chunks(&mut volume, until);
-            start.first_meshes(&mut volume, &settings, until);
+        let heart = volume.heart();
+        if (heart.has_meshed() || heart.has_to_mesh())
+            && let Some(voxel_size) = volume.settings().map(|settings| settings.voxel_size)
+        {
+            update.mesh(&mut Drawing { terrain, voxel_size, heart: volume.heart_mut() });
         }
     }
-    main_thread.stop(start);
-}
-
-/// Whether a chunk and all around it are certainly of one kind: that is asked without touching shared samples.
-fn is_uniform_around(grid: &Grid<i16>, position: [i32; 3]) -> bool {
-    !matches!(grid.chunk(position), Some(Chunk::Samples(_))) && grid.neighbourhood_view(position).is_uniform()
+    let edits = update.edits;
+    budget.spend(start + edits);
+    budget.spend_on_edits(edits);
 }
 
 /// How many bytes a mesh takes, in memory and, or about so, on the graphics card.
@@ -165,204 +139,206 @@ pub(crate) fn geometry_bytes(mesh: &MeshBuffer) -> usize {
         + size_of_val(&mesh.indices[..])
 }
 
-/// Starting the groups of one terrain.
-struct Start<'a, 'w, 's> {
-    terrain: Entity,
+/// Meshing and showing, in one update.
+struct Update<'a, 'w, 's> {
     queue: &'a WorkQueue,
-    results: &'a MeshResults,
     screen: &'a mut Screen<'w, 's>,
-    /// Groups of at most so many chunks are meshed at once.
+    until: Instant,
+    /// At most this many chunks of a terrain are meshed at once that give way to edits.
+    in_flight: usize,
+    /// Groups of at most this many chunks are meshed at once, and this many chunks in all.
     inline: usize,
+    inline_left: usize,
+    upload_bytes: usize,
+    /// So much has been taken from jobs.
+    bytes: usize,
+    /// What edits have taken, which is not at the cost of others.
+    edits: Duration,
 }
 
-impl Start<'_, '_, '_> {
-    /// Goes through the chunks that can be meshed for the first time; those without a surface need no job.
-    fn ready_chunks(&mut self, volume: &mut TerrainVolume, until: Instant) {
-        let mut no_longer_drawn = BTreeSet::new();
-        let (mut done, mut later) = (0, Vec::new());
-        while let Some(key) = volume.ready.pop() {
-            let is_ready = volume.chunks.get(&key).is_some_and(ChunkState::is_ready);
-            if !is_ready || volume.pending.iter().any(|pending| pending.chunks.contains(&key)) {
-                // Gone, or meshed already; or it will be, with the changed ones.
-                continue;
-            }
-            if volume.claims.contains_key(&key) {
-                later.push(key);
-            } else if volume.is_without_surface(key) || is_uniform_around(&volume.grid, key.position) {
-                if let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.empty) {
-                    (state.drawn, state.stale) = (true, false);
-                    volume.streaming.may_drop_more = true;
-                    if let Some(chunk) = volume.grid.chunk(key.position) {
-                        volume.shown.load(key.position, chunk.clone()).expect("a chunk of the same extent");
-                    }
-                } else {
-                    no_longer_drawn.insert(key);
+/// One terrain.
+struct Drawing<'a> {
+    terrain: Entity,
+    voxel_size: f32,
+    heart: &'a mut Heart,
+}
+
+impl Update<'_, '_, '_> {
+    /// Everything for one terrain.
+    fn mesh(&mut self, drawing: &mut Drawing) {
+        self.take_results(drawing);
+        let start = Instant::now();
+        while let Some(prepared) = drawing.heart.next_changed() {
+            self.start(drawing, prepared);
+        }
+        let edits = start.elapsed();
+        (self.edits, self.until) = (self.edits + edits, self.until + edits);
+        drawing.heart.sort_ready(self.until);
+        self.first_meshes(drawing);
+        self.restyle(drawing);
+        self.transition(drawing);
+    }
+
+    /// Takes what jobs have meshed, and shows the groups that are complete.
+    fn take_results(&mut self, drawing: &mut Drawing) {
+        loop {
+            let bytes = Cell::new(self.bytes);
+            let Self { until, upload_bytes, .. } = *self;
+            let stats = &mut self.screen.stats;
+            // New chunks may come one by one; an edit is shown as a whole.
+            let may_take_more = || bytes.get() == 0 || bytes.get() <= upload_bytes && Instant::now() < until;
+            let note = |meshed: &Meshed| {
+                bytes.set(bytes.get() + geometry_bytes(&meshed.geometry).max(1));
+                if !meshed.time.is_zero() {
+                    stats.count_mesh(meshed.time);
                 }
-            } else {
-                volume.streaming.add_to_mesh(key);
-            }
-            done += 1;
-            if done % 4 == 0 && Instant::now() >= until {
-                break;
-            }
-        }
-        volume.ready.append(&mut later);
-        self.group(volume, Pending { chunks: no_longer_drawn, ..Pending::default() }, Priority::Edit);
-    }
-
-    /// Starts the most urgent chunks that are to be meshed for the first time, one by one, as many as may be in flight.
-    fn first_meshes(&mut self, volume: &mut TerrainVolume, settings: &MarchlessSettings, until: Instant) {
-        let (limit, mut done) = (in_flight(settings), 0);
-        while volume.first_meshes < limit {
-            let TerrainVolume { chunks, pending, streaming, .. } = &mut *volume;
-            let waits = |key: &ChunkKey| {
-                chunks.get(key).is_some_and(ChunkState::is_ready)
-                    && !pending.iter().any(|pending| pending.chunks.contains(key))
             };
-            let Some(key) = streaming.next_to_mesh(waits) else { break };
-            if volume.claims.contains_key(&key) {
-                volume.ready.push(key);
-                continue;
+            let complete = drawing.heart.take_meshed(may_take_more, note);
+            self.bytes = bytes.get();
+            let Some(group) = complete else { break };
+            if group.gives_way() {
+                // What commands do later takes its time, too.
+                self.until = self.until.checked_sub(ENTITY_TIME).unwrap_or(self.until);
             }
-            let urgency = volume.streaming.ranges().urgency(key.position);
-            let pending = Pending { chunks: BTreeSet::from([key]), ..Pending::default() };
-            self.group(volume, pending, Priority::FirstMesh(urgency));
-            done += 1;
-            if done % 2 == 0 && Instant::now() >= until {
-                break;
-            }
+            let shown = drawing.heart.show(group);
+            self.show(drawing, shown);
         }
     }
 
-    /// Starts the changed chunks that no group is working on.
-    fn pending_chunks(&mut self, volume: &mut TerrainVolume) {
-        for pending in core::mem::take(&mut volume.pending) {
-            if volume.free_for_edit(&pending.chunks) {
-                self.group(volume, pending, Priority::Edit);
-            } else {
-                volume.pending.push(pending);
+    /// Starts the most urgent chunks that are to be meshed for the first time, one by one.
+    fn first_meshes(&mut self, drawing: &mut Drawing) {
+        let mut done = 0;
+        while (done % 2 != 0 || done == 0 || Instant::now() < self.until)
+            && let Some((prepared, urgency)) = drawing.heart.next_first_mesh(self.in_flight)
+        {
+            self.start_jobs(drawing, prepared, Priority::FirstMesh(urgency));
+            done += 1;
+        }
+    }
+
+    /// Gives chunks another look, one by one.
+    fn restyle(&mut self, drawing: &mut Drawing) {
+        let assets = self.screen.assets.is_some();
+        let mut done = 0;
+        while (done == 0 || Instant::now() < self.until)
+            && let Some(restyle) = drawing.heart.next_restyle(self.in_flight, assets)
+        {
+            match restyle {
+                Restyle::Mesh(prepared) => self.start_jobs(drawing, prepared, Priority::Restyle),
+                Restyle::Recolor(key, group, geometry) => {
+                    let (results, colors) = (drawing.heart.meshed().clone(), drawing.heart.colors().clone());
+                    drawing.heart.start_recolor(group, |id| {
+                        self.queue.push(Priority::Restyle, move || {
+                            results.push(MeshResult::OfGroup(id, recolor(key.position, geometry, &colors)));
+                        })
+                    });
+                }
             }
+            done += 1;
+        }
+    }
+
+    /// Lets the change to another isovalue go on, and end.
+    fn transition(&mut self, drawing: &mut Drawing) {
+        if drawing.heart.may_end_transition(self.inline) {
+            self.end_transition(drawing);
+        }
+        let mut done = 0;
+        while (done == 0 || Instant::now() < self.until)
+            && let Some((key, job, settings)) = drawing.heart.next_in_transition(self.in_flight)
+        {
+            let samples = drawing.heart.samples().neighbourhood(key.position).to_neighbourhood();
+            let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+            let (results, look) = (drawing.heart.meshed().clone(), drawing.heart.look());
+            let ticket = self.queue.push(Priority::Restyle, move || {
+                let meshed = mesh_chunk(&samples.view(), key.position, &settings, colors.as_ref(), None);
+                results.push(MeshResult::Restyled(Restyled { job, meshed, look }));
+            });
+            drawing.heart.started_in_transition(key, job, ticket);
+            done += 1;
+        }
+    }
+
+    /// Meshes what is missing for the other isovalue, and shows it.
+    fn end_transition(&mut self, drawing: &mut Drawing) {
+        let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+        while let Some((key, _, settings)) = drawing.heart.next_in_transition(usize::MAX) {
+            let samples = [(key.position, drawing.heart.samples().neighbourhood(key.position))];
+            let meshed = mesh_now(&samples, &settings, colors.as_ref(), &self.screen.rooms);
+            for meshed in meshed {
+                self.screen.stats.count_mesh(meshed.time);
+                drawing.heart.meshed_in_transition(meshed);
+            }
+        }
+        if let Some(shown) = drawing.heart.end_transition() {
+            self.show(drawing, shown);
         }
     }
 
     /// Starts a group: shows it at once, where that is quick, or asks for its meshes.
-    fn group(&mut self, volume: &mut TerrainVolume, pending: Pending, priority: Priority) {
-        let Pending { chunks, look_the_same, since } = pending;
-        let Some(terrain) = &volume.settings else { return };
-        let settings = terrain.mesh_settings();
-        let mut group = Group {
-            chunks,
-            snapshot: BTreeMap::new(),
-            isovalue: settings.isovalue,
-            since,
-            withdrawable: matches!(priority, Priority::FirstMesh(_)),
-            tickets: Vec::new(),
-            members: 0,
-            meshed: Vec::new(),
-        };
-        // What is drawn changes with the others: where samples around it are missing, all wait for them.
-        let mut waits = false;
-        for key in &group.chunks {
-            if let Some(state) = volume.chunks.get_mut(key)
-                && state.wanted == Wanted::Mesh
-                && (state.drawn && !state.hidden && state.missing > 0)
-            {
-                (state.stale, waits) = (true, true);
-                volume.streaming.look_at(*key);
-            }
+    fn start(&mut self, drawing: &mut Drawing, prepared: Prepared) {
+        let count = prepared.to_mesh.len();
+        if count > self.inline.min(self.inline_left) {
+            return self.start_jobs(drawing, prepared, Priority::Edit);
         }
-        if waits {
-            volume.pending.push(Pending { chunks: group.chunks, look_the_same, since });
-            return;
+        self.inline_left -= count;
+        let (settings, mut group) = (drawing.heart.mesh_settings(), prepared.group);
+        let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+        let samples: Vec<_> = prepared
+            .to_mesh
+            .iter()
+            .map(|position| (*position, drawing.heart.samples().neighbourhood(*position)))
+            .collect();
+        let meshed = mesh_now(&samples, &settings, colors.as_ref(), &self.screen.rooms);
+        self.screen.rooms.prepare(meshed.iter().map(|meshed| &*meshed.geometry), colors.is_some());
+        for meshed in meshed {
+            self.screen.stats.count_mesh(meshed.time);
+            group.push(meshed);
         }
-        let is_member = |key: &ChunkKey| {
-            let is_wanted = |state: &ChunkState| state.wanted == Wanted::Mesh && !state.hidden && state.missing == 0;
-            volume.chunks.get(key).is_some_and(is_wanted)
-        };
-        let members: Vec<ChunkKey> = group.chunks.iter().copied().filter(is_member).collect();
-        let mut to_mesh = Vec::new();
-        for key in members {
-            let samples = volume.grid.neighbourhood_view(key.position);
-            let shown = volume.shown.neighbourhood_view(key.position);
-            for (near, (chunk, shown)) in key.around().zip(samples.chunks().iter().zip(shown.chunks())) {
-                let Some(chunk) = chunk.filter(|chunk| !shown.is_some_and(|shown| same_samples(shown, chunk))) else {
-                    continue;
-                };
-                let is_drawn = || volume.chunks.get(&near).is_some_and(|state| state.drawn);
-                if group.chunks.contains(&near) || !is_drawn() {
-                    group.snapshot.entry(near.position).or_insert_with(|| chunk.clone());
+        let shown = drawing.heart.show(group);
+        self.show(drawing, shown);
+    }
+
+    /// Asks for the meshes of a group; shows it, if there are none to be made.
+    fn start_jobs(&mut self, drawing: &mut Drawing, prepared: Prepared, priority: Priority) {
+        if prepared.to_mesh.is_empty() {
+            let shown = drawing.heart.show(prepared.group);
+            return self.show(drawing, shown);
+        }
+        let (results, settings) = (drawing.heart.meshed().clone(), drawing.heart.mesh_settings());
+        let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+        drawing.heart.start(prepared, |heart, id, position| {
+            let samples = heart.samples().neighbourhood(position).to_neighbourhood();
+            let (results, colors) = (results.clone(), colors.clone());
+            self.queue.push(priority, move || {
+                let meshed = mesh_chunk(&samples.view(), position, &settings, colors.as_ref(), None);
+                results.push(MeshResult::OfGroup(id, meshed));
+            })
+        });
+    }
+
+    fn show(&mut self, drawing: &mut Drawing, shown: Shown) {
+        let cells = [drawing.heart.samples().shown().chunk_cells(); 3];
+        for swap in shown.swaps {
+            match swap.place {
+                Place::Nowhere => {}
+                Place::On(entity) => self.screen.show(entity, swap.meshed, cells),
+                Place::Recolored(entity) => {
+                    if let Some(mesh) = swap.meshed.mesh {
+                        self.screen.show_asset(entity, mesh);
+                    }
+                }
+                Place::New => {
+                    let Swap { key, look, meshed, .. } = swap;
+                    let geometry = meshed.geometry.clone();
+                    let chunk = new_chunk(drawing.terrain, key, cells[0], drawing.voxel_size);
+                    let entity = self.screen.spawn(chunk, meshed, cells);
+                    drawing.heart.spawned(key, Drawn { entity, geometry, look });
                 }
             }
-            let is_drawn = volume.chunks.get(&key).is_some_and(|state| state.drawn && !state.stale);
-            if is_drawn && look_the_same.contains(&key) {
-                continue;
-            }
-            group.members += 1;
-            if samples.is_uniform() {
-                group.meshed.push(Meshed::empty(key.position));
-            } else {
-                to_mesh.push((key.position, samples));
-            }
         }
-        if group.members == 0 && group.snapshot.is_empty() {
-            return;
+        for since in shown.since {
+            self.screen.stats.count_edit_shown(since);
         }
-        let colors = self.screen.assets.is_some().then(|| volume.colors.clone());
-        if to_mesh.len() <= self.inline {
-            let meshed = mesh_now(&to_mesh, &settings, colors.as_ref(), &self.screen.rooms);
-            self.screen.rooms.prepare(meshed.iter().map(|meshed| &*meshed.geometry), colors.is_some());
-            for meshed in meshed {
-                self.screen.count_mesh(meshed.time);
-                group.meshed.push(meshed);
-            }
-            show_group(self.terrain, volume, group, self.screen);
-            return;
-        }
-        let to_mesh: Vec<_> =
-            to_mesh.into_iter().map(|(position, samples)| (position, samples.to_neighbourhood())).collect();
-        let id = volume.claim(&group.chunks);
-        volume.first_meshes += usize::from(group.withdrawable);
-        for (position, samples) in to_mesh {
-            let (terrain, results, colors) = (self.terrain, self.results.0.clone(), colors.clone());
-            let run = move || {
-                let meshed = mesh_chunk(&samples.view(), position, &settings, colors.as_ref(), None);
-                results.push(MeshResult { terrain, group: id, meshed });
-            };
-            group.tickets.push(self.queue.push(priority, run));
-        }
-        volume.groups.insert(id, group);
-    }
-}
-
-/// Shows all chunks of a complete group.
-fn show_group(terrain: Entity, volume: &mut TerrainVolume, group: Group, screen: &mut Screen) {
-    let Some(voxel_size) = volume.settings.as_ref().map(|settings| settings.voxel_size) else { return };
-    let cells = volume.grid.chunk_cells();
-    for meshed in group.meshed {
-        let key = ChunkKey::finest(meshed.position);
-        let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.wanted == Wanted::Mesh) else { continue };
-        let (was_empty, is_empty) = (state.empty, meshed.geometry.is_empty());
-        (state.drawn, state.empty, state.stale) = (true, is_empty, false);
-        match state.entity {
-            Some(entity) if !(was_empty && is_empty) => screen.show(entity, meshed, [cells; 3]),
-            None if !is_empty && !state.hidden => {
-                state.entity = Some(screen.spawn(new_chunk(terrain, key, cells, voxel_size), meshed, [cells; 3]));
-            }
-            _ => {}
-        }
-    }
-    for (position, chunk) in group.snapshot {
-        let key = ChunkKey::finest(position);
-        let Some(state) = volume.chunks.get(&key) else { continue };
-        let is_new = || !volume.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk));
-        if (group.chunks.contains(&key) || !state.drawn) && is_new() {
-            volume.forget_shown(position);
-            volume.shown.load(position, chunk).expect("a chunk of the same extent");
-        }
-    }
-    volume.shown_isovalue = group.isovalue;
-    volume.streaming.may_drop_more = true;
-    if let Some(since) = group.since {
-        screen.stats.edit_is_visible(since);
     }
 }

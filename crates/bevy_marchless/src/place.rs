@@ -26,7 +26,7 @@ impl PlaceItem<'_, '_> {
     pub(crate) fn to_world(&self) -> DAffine3 {
         #[cfg(feature = "big_space")]
         if let Some(grid) = self.grid {
-            return crate::big_space::grid_to_world(grid);
+            return grid_to_world(grid);
         }
         in_double_precision(self.transform)
     }
@@ -41,4 +41,11 @@ impl PlaceItem<'_, '_> {
 pub(crate) fn in_double_precision(transform: &GlobalTransform) -> DAffine3 {
     let affine = transform.affine();
     DAffine3 { matrix3: affine.matrix3.as_dmat3(), translation: affine.translation.as_dvec3() }
+}
+
+/// From the space of a grid to world space, which is relative to the floating origin's cell.
+#[cfg(feature = "big_space")]
+fn grid_to_world(grid: &::big_space::grid::Grid) -> DAffine3 {
+    let origin = grid.local_floating_origin();
+    origin.grid_transform() * DAffine3::from_translation(-grid.cell_to_float(&origin.cell()))
 }

@@ -1,5 +1,6 @@
 //! [`TerrainQuery`]: what a ray hits, how far away the surface is.
 
+use bevy_app::{App, Plugin};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_math::{DVec3, IVec3, Ray3d, Vec3};
@@ -8,7 +9,17 @@ use marchless::Region;
 
 use crate::chunk::ChunkKey;
 use crate::place::{Place, PlaceItem};
-use crate::terrain::{ChunkState, TerrainVolume};
+use crate::terrain::TerrainVolume;
+
+/// Registers the types of answers; the questions need no plugin.
+#[derive(Default)]
+pub struct QueryPlugin;
+
+impl Plugin for QueryPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<TerrainHit>();
+    }
+}
 
 /// Questions to all terrains, in world space.
 ///
@@ -72,12 +83,12 @@ impl TerrainQuery<'_, '_> {
         // The samples between which it lies may be in up to eight chunks.
         let corner = lattice.floor().as_ivec3();
         let ends = [corner, corner.saturating_add(IVec3::ONE)];
-        let [low, high] = ends.map(|end| volume.grid.chunk_of(end.to_array()));
+        let [low, high] = ends.map(|end| volume.grid().chunk_of(end.to_array()));
         let unfilled = |chunk| is_unfilled(volume, chunk);
         if Region::new(low, high.map(|v| v + 1)).points().any(unfilled) {
             return None;
         }
-        marchless::weight_at(&volume.grid, lattice.to_array())
+        marchless::weight_at(volume.grid(), lattice.to_array())
     }
 
     /// A position in world space in voxels from the terrain's lowest corner, as stamps want it.
@@ -98,9 +109,8 @@ impl TerrainQuery<'_, '_> {
 
 /// Whether the samples of a chunk of the terrain's extent are not there: it is not filled yet, not loaded, or they were dropped.
 fn is_unfilled(volume: &TerrainVolume, chunk: [i32; 3]) -> bool {
-    let is_filled = volume.chunks.get(&ChunkKey::finest(chunk)).is_none_or(ChunkState::is_filled);
-    let is_there = is_filled && volume.grid.chunk(chunk).is_some();
-    !is_there && volume.grid.bounds().is_none_or(|bounds| bounds.contains(chunk))
+    let is_there = volume.grid().chunk(chunk).is_some();
+    !is_there && volume.grid().bounds().is_none_or(|bounds| bounds.contains(chunk))
 }
 
 fn cast(
@@ -119,11 +129,9 @@ fn cast(
     let mut start = 0.0;
     loop {
         let from = origin + direction * start;
-        let (shown, isovalue) = (&volume.shown, volume.shown_isovalue);
+        let (shown, isovalue) = (volume.shown(), volume.shown_isovalue());
         let hit = marchless::ray_cast(shown, isovalue, from.to_array(), direction.to_array(), reach - start)?;
-        let drawn =
-            volume.chunks.get(&ChunkKey::finest(hit.chunk)).filter(|state| state.drawn).and_then(|state| state.entity);
-        let Some(chunk) = drawn else {
+        let Some(chunk) = volume.heart().entity(ChunkKey::finest(hit.chunk)) else {
             // The samples of a chunk that is not drawn yet, known for the sake of its neighbours: on behind them.
             start += hit.distance + 1e-3;
             continue;

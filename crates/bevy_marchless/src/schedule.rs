@@ -8,9 +8,9 @@ use bevy_ecs::prelude::*;
 use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
 
-use crate::stats::{MainThread, Stats, count_update, sum_up};
-use crate::stream::StreamStats;
-use crate::work::{WorkQueue, start_work};
+use crate::budget::FrameBudget;
+use crate::jobs::WorkQueue;
+use crate::stats::{TerrainStats, count_main_thread, count_update};
 
 /// The plugin's systems. All of them run in [`PostUpdate`], before transforms are propagated and asset events are
 /// sent, so that what is written in `Update` shows in the same frame.
@@ -33,26 +33,44 @@ use crate::work::{WorkQueue, start_work};
 pub enum MarchlessSystems {
     /// Reads [`Stamp`](crate::brush::Stamp) messages into a queue.
     ReadStamps,
-    /// Everything below, and the set that a run condition may pause.
+    /// All else, and the set that a run condition may pause. [`TerrainEdited`](crate::brush::TerrainEdited) messages are
+    /// written in it, and meshes shown.
     Work,
-    /// Gives new terrains their volume and chunks, and follows changes of their settings. In `Work`.
+    /// In `Work`, once the update's new chunks are there: the place for what adds to them, so that it is there before they
+    /// are first drawn.
+    Decorate,
+}
+
+/// What the plugin does in [`MarchlessSystems::Work`], in order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Phase {
+    /// Gives new terrains their volume, and follows changes of their settings.
     Prepare,
-    /// Takes sampled chunks into the volumes and asks for more. In `Work`.
+    /// Lets chunks come and go.
+    Follow,
+    /// Takes sampled chunks into the volumes and asks for more.
     Fill,
-    /// Applies stamps to the samples. In `Work`.
+    /// Applies stamps to the samples.
     Edit,
-    /// Meshes groups of changed chunks and shows those that are complete. In `Work`.
+    /// Meshes groups of changed chunks and shows those that are complete.
     Mesh,
-    /// Measures. In `Work`.
+    /// Has threads begin what has been asked for.
+    Start,
+    /// Measures.
     Report,
 }
+
+/// Somebody makes meshes of chunks: else they do not wait for them.
+#[derive(Resource, Default)]
+pub(crate) struct MakesMeshes;
 
 /// How the plugin shares out its work; the defaults fit most games.
 #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Resource, Default, Debug, PartialEq, Clone)]
 pub struct MarchlessSettings {
-    /// A group of at most so many chunks is meshed within the update that changed it; a larger one in tasks, to be
-    /// shown updates later. Unit: chunks with a surface. Default 8: what a small stamp at a corner of chunks touches.
+    /// A group of at most this many chunks is meshed within the update that changed it; a larger one in tasks, to be
+    /// shown updates later. Groups of 1,024 chunks in all are meshed within one update at most.
+    /// Unit: chunks with a surface. Default 8: what a small stamp at a corner of chunks touches.
     pub inline_chunks: usize,
     /// How many chunks may be on their way through the jobs that sample and mesh them for the first time, for each thread
     /// of the pool: few, so that what is seen first comes first; enough for an update. At least 1. Default 64.
@@ -60,8 +78,9 @@ pub struct MarchlessSettings {
     /// So many bytes of new meshes are shown per update, and one chunk more, so that the graphics card is not flooded;
     /// edits are shown at once whatever their size. Default 4 MiB.
     pub upload_bytes: usize,
-    /// How long the main thread may load and unload chunks per update; what is left waits. Each update does some. Default:
-    /// six tenths of a millisecond.
+    /// How long the main thread may load and unload chunks per update; what is left waits. Each update does some. Edits take
+    /// what they need beside it; streaming holds back for them in one of five updates at most. Default: six tenths of a
+    /// millisecond.
     pub main_thread: Duration,
     /// Without threads: how many chunks may be sampled or meshed per update, on the main thread; `Some(0)` lets them all
     /// wait, and only what `inline_chunks` allows is meshed. `None`: in tasks,
@@ -81,27 +100,53 @@ impl Default for MarchlessSettings {
     }
 }
 
+impl MarchlessSettings {
+    /// How many chunks of a terrain may be sampled, and how many meshed without an edit, at once.
+    pub(crate) fn in_flight(&self, threads: usize) -> usize {
+        self.chunks_in_flight.max(1).saturating_mul(if self.budget.is_some() { 1 } else { threads })
+    }
+}
+
 /// Orders the plugin's systems. The other parts of [`MarchlessPlugins`](crate::MarchlessPlugins) need it.
 #[derive(Default)]
 pub struct SchedulePlugin;
 
 impl Plugin for SchedulePlugin {
     fn build(&self, app: &mut App) {
-        use MarchlessSystems::{Edit, Fill, Mesh, Prepare, ReadStamps, Report, Work};
+        use MarchlessSystems::{Decorate, ReadStamps, Work};
+        use Phase::{Edit, Fill, Follow, Mesh, Prepare, Report, Start};
 
-        app.init_resource::<MarchlessSettings>()
-            .register_type::<MarchlessSettings>()
+        app.register_type::<MarchlessSettings>()
+            .register_type::<TerrainStats>()
+            .init_resource::<MarchlessSettings>()
+            .init_resource::<TerrainStats>()
+            .init_resource::<FrameBudget>()
             .init_resource::<WorkQueue>()
-            .init_resource::<Stats>()
-            .add_systems(PostUpdate, count_update.in_set(MarchlessSystems::ReadStamps))
             .configure_sets(
                 PostUpdate,
                 (ReadStamps, Work).chain().before(TransformSystems::Propagate).before(AssetEventSystems),
             )
-            .configure_sets(PostUpdate, (Prepare, Fill, Edit, Mesh, Report).chain().in_set(Work))
-            .init_resource::<MainThread>()
-            .init_resource::<StreamStats>()
-            .add_systems(PostUpdate, start_work.in_set(Work).after(Mesh).before(Report))
-            .add_systems(PostUpdate, sum_up.in_set(Work).after(Report));
+            .configure_sets(
+                PostUpdate,
+                (Prepare, Follow, Fill, Edit, Mesh, Decorate, Start, Report).chain().in_set(Work),
+            )
+            .add_systems(PostUpdate, count_update.in_set(ReadStamps))
+            .add_systems(PostUpdate, begin_update.in_set(Work).before(Prepare))
+            .add_systems(PostUpdate, start_jobs.in_set(Start))
+            .add_systems(PostUpdate, count_main_thread.in_set(Work).after(Report));
     }
 }
+
+/// Begins the update's time.
+fn begin_update(settings: Res<MarchlessSettings>, edits: Option<Res<NewEdits>>, mut budget: ResMut<FrameBudget>) {
+    budget.begin(settings.main_thread, edits.is_some_and(|edits| edits.0));
+}
+
+/// Has threads begin what has been asked for or, without threads, does a part of it.
+fn start_jobs(queue: Res<WorkQueue>, settings: Res<MarchlessSettings>) {
+    queue.start(settings.budget);
+}
+
+/// Whether stamps are to be applied in this update, for which streaming holds back.
+#[derive(Resource, Default)]
+pub(crate) struct NewEdits(pub(crate) bool);

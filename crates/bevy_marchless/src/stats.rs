@@ -1,27 +1,51 @@
-//! [`Stats`]: what an update did, for the diagnostics.
+//! [`TerrainStats`]: what the plugin has done, in all. Each figure is counted in one place.
+
+use core::time::Duration;
 
 use bevy_ecs::prelude::*;
 use bevy_platform::time::Instant;
-use core::time::Duration;
+use bevy_reflect::prelude::*;
 
-use crate::stream::StreamStats;
+use crate::budget::FrameBudget;
 
-/// The work of one update; the diagnostics read it and start it over.
-#[derive(Resource, Debug, Default)]
-pub(crate) struct Stats {
-    /// Counts updates, paused ones included.
-    pub(crate) update: u64,
-    /// How many chunks were meshed, and how long that took in all.
-    pub(crate) meshed: u32,
-    pub(crate) mesh_time: Duration,
-    /// How long the latest edit that became visible was on its way.
-    pub(crate) edit_to_visible: Option<(u64, Duration)>,
+/// What the plugin has done for all terrains since the start.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Default, Debug, PartialEq, Clone)]
+pub struct TerrainStats {
+    /// Updates, paused ones included.
+    pub updates: u64,
+    /// Chunks that came into range, their surroundings included.
+    pub loaded: u64,
+    /// Chunks that went out of range.
+    pub unloaded: u64,
+    /// Chunks that the source's bound settled, so that they needed no job.
+    pub bounded: u64,
+    /// Chunks that took sampling.
+    pub filled: u64,
+    /// Those of them that proved empty: all of their own samples lie on one side of the surface.
+    pub filled_empty: u64,
+    /// Chunks that were meshed, again after edits included; not those that are known to have no surface.
+    pub meshed: u64,
+    /// How long jobs have sampled and bounded, in all.
+    pub fill_time: Duration,
+    /// How long chunks were meshed, in all.
+    pub mesh_time: Duration,
+    /// Edits that have been shown; those that were shown together count once.
+    pub edits_shown: u64,
+    /// How many updates after the one that read its stamp the latest edit was shown; 0 is the same one.
+    pub edit_updates_last: u64,
+    /// How long after its stamp was read the latest edit was shown.
+    pub edit_time_last: Duration,
+    /// How long the plugin's systems have taken, in all; waiting for edits' meshes included.
+    pub main_thread: Duration,
+    /// How long they took in the latest update.
+    pub main_thread_last: Duration,
 }
 
-impl Stats {
+impl TerrainStats {
     /// This moment.
     pub(crate) fn now(&self) -> Since {
-        Since { update: self.update, time: Instant::now() }
+        Since { update: self.updates, time: Instant::now() }
     }
 
     /// Notes that a chunk has been meshed.
@@ -31,16 +55,18 @@ impl Stats {
     }
 
     /// Notes that an edit asked for at `since` is visible.
-    pub(crate) fn edit_is_visible(&mut self, since: Since) {
-        self.edit_to_visible = Some((self.update - since.update, since.time.elapsed()));
+    pub(crate) fn count_edit_shown(&mut self, since: Since) {
+        self.edits_shown += 1;
+        self.edit_updates_last = self.updates - since.update;
+        self.edit_time_last = since.time.elapsed();
     }
 }
 
 /// When something was asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Since {
-    pub(crate) update: u64,
-    pub(crate) time: Instant,
+    update: u64,
+    time: Instant,
 }
 
 impl Since {
@@ -52,40 +78,12 @@ impl Since {
     }
 }
 
-/// How long the plugin's systems have taken in this update.
-#[derive(Resource, Debug, Default)]
-pub(crate) struct MainThread(Duration);
-
-impl MainThread {
-    /// A system begins.
-    pub(crate) fn start(&self) -> Instant {
-        Instant::now()
-    }
-
-    /// It ends.
-    pub(crate) fn stop(&mut self, start: Instant) {
-        self.0 += start.elapsed();
-    }
-
-    /// Until when a system that has begun at `start` may go on, if all of the update's systems so far are to take this
-    /// long.
-    pub(crate) fn until(&self, start: Instant, all: Duration) -> Instant {
-        let left = all.saturating_sub(self.0);
-        start.checked_add(left).unwrap_or_else(|| start + Duration::from_secs(3_600))
-    }
-
-    /// The update's time so far.
-    pub(crate) const fn so_far(&self) -> Duration {
-        self.0
-    }
+pub(crate) fn count_update(mut stats: ResMut<TerrainStats>) {
+    stats.updates += 1;
 }
 
-/// Ends the update's time.
-pub(crate) fn sum_up(mut main_thread: ResMut<MainThread>, mut stream: ResMut<StreamStats>) {
-    let time = core::mem::take(&mut main_thread.0);
-    (stream.main_thread, stream.main_thread_last) = (stream.main_thread + time, time);
-}
-
-pub(crate) fn count_update(mut stats: ResMut<Stats>) {
-    stats.update += 1;
+/// Adds up what the update's systems have taken.
+pub(crate) fn count_main_thread(budget: Res<FrameBudget>, mut stats: ResMut<TerrainStats>) {
+    stats.main_thread += budget.spent();
+    stats.main_thread_last = budget.spent();
 }

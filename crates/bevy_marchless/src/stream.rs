@@ -1,11 +1,11 @@
 //! [`TerrainViewer`]: chunks are loaded where somebody looks, and go when nobody does.
 //!
-//! A terrain's volume remembers the *ranges* in which its chunks are loaded: one around each viewer, and what the terrain
-//! keeps anyway. When a viewer has moved by more than an eighth of a chunk, its range moves with it, and the chunks in which
-//! the old and the new range differ are gone through, nearest first, within the update's time: each becomes what the ranges
-//! ask of it. A chunk in range is a *leaf*: drawn, known to be empty, or still to be filled. Chunks one farther away have
-//! samples only, for the sake of their neighbours' meshes. What is loaded stays until it is farther away than the range and
-//! the viewer's margin, so that going to and fro over a border loads nothing twice.
+//! What each viewer sees, and what a terrain keeps anyway, is its *cover*. When a viewer has moved by more than an eighth of
+//! a chunk, its range moves with it, and the chunks in which the old and the new range differ are gone through, nearest
+//! first and viewer by viewer in turn, within the update's time: each becomes what the cover asks of it. A chunk in range
+//! is a *leaf*: drawn, known to be empty, or still to be filled. Chunks one farther away have samples only, for
+//! their neighbours' meshes. What is drawn stays until it is farther away than the range and the viewer's margin, so that
+//! going to and fro over a border loads nothing twice.
 //!
 //! ```
 //! use bevy_marchless::prelude::*;
@@ -20,20 +20,32 @@
 //! }
 //! ```
 
-mod agenda;
+mod fill;
 mod follow;
-mod look;
-mod range;
+mod view;
 
-use core::time::Duration;
-
+use bevy_app::{App, Plugin, PostUpdate};
 use bevy_ecs::prelude::*;
-use bevy_math::{IVec3, Vec3};
+use bevy_math::Vec3;
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
 
-pub(crate) use follow::{ENTITY_TIME, Streaming, ask_for_samples, follow_viewers, free_samples_for, in_flight};
-pub(crate) use range::Wanted;
+pub use crate::cover::{Coverage, Leaf, LeafState};
+use crate::schedule::Phase;
+use crate::terrain::TerrainVolume;
+
+/// Loads terrains around viewers, fills them from their sources, and unloads them.
+#[derive(Default)]
+pub struct StreamPlugin;
+
+impl Plugin for StreamPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<TerrainViewer>();
+        app.register_required_components::<TerrainVolume, follow::Followed>();
+        app.add_systems(PostUpdate, follow::follow_viewers.in_set(Phase::Follow))
+            .add_systems(PostUpdate, (fill::take_filled_chunks, fill::ask_for_samples).chain().in_set(Phase::Fill));
+    }
+}
 
 /// Loads the chunks of all terrains around its entity.
 ///
@@ -52,7 +64,7 @@ pub struct TerrainViewer {
     pub margin: f32,
     /// Within this many voxels samples stay in memory once they are drawn; 0 or more. Default: ∞, all of them.
     ///
-    /// Those farther away are dropped as long as they have never been edited, and filled again when a viewer comes near or
+    /// Those farther away are dropped, unless many stamps have changed them, and filled again when a viewer comes near or
     /// an edit needs them. Until then rays pass through, and edits there show some updates later.
     pub sample_radius: f32,
 }
@@ -87,66 +99,4 @@ impl Default for TerrainViewer {
     fn default() -> Self {
         Self::new(256.0).with_height(128.0)
     }
-}
-
-/// What a terrain shows at one place: one piece of its cover.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[reflect(Debug, PartialEq, Hash, Clone)]
-pub struct Leaf {
-    /// The level of detail; 0 is the finest, and at present there is no other.
-    pub level: u8,
-    /// The chunk's place, in chunks of this level.
-    pub position: IVec3,
-    /// What is shown of it.
-    pub state: LeafState,
-}
-
-/// What is shown of a leaf.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[reflect(Debug, PartialEq, Hash, Clone)]
-pub enum LeafState {
-    /// Not filled or not meshed yet.
-    Waiting,
-    /// Known to have no surface.
-    Empty,
-    /// Its mesh.
-    Drawn,
-}
-
-/// How many leaves of each state a terrain has.
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[reflect(Default, Debug, PartialEq, Hash, Clone)]
-pub struct Coverage {
-    /// See [`LeafState::Waiting`].
-    pub waiting: usize,
-    /// See [`LeafState::Empty`].
-    pub empty: usize,
-    /// See [`LeafState::Drawn`].
-    pub drawn: usize,
-}
-
-/// What has been done for all terrains since the start.
-#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[reflect(Resource, Default, Debug, PartialEq, Clone)]
-pub struct StreamStats {
-    /// Chunks that came into range, their surroundings included.
-    pub loaded: u64,
-    /// Chunks that went out of range.
-    pub unloaded: u64,
-    /// Chunks that the source's bound settled, so that they needed no job.
-    pub bounded: u64,
-    /// Chunks that took sampling.
-    pub filled: u64,
-    /// Those of them that proved empty: all of their own samples lie on one side of the surface.
-    pub filled_empty: u64,
-    /// Chunks that were meshed, again after edits included; not those that are known to have no surface.
-    pub meshed: u64,
-    /// How long jobs have sampled and bounded, in all.
-    pub fill_time: Duration,
-    /// How long chunks were meshed, in all.
-    pub mesh_time: Duration,
-    /// How long the plugin's systems have taken, in all; waiting for edits' meshes included.
-    pub main_thread: Duration,
-    /// The same of the latest update.
-    pub main_thread_last: Duration,
 }

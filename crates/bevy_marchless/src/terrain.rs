@@ -1,9 +1,7 @@
 //! [`Terrain`]: a terrain's settings and source; give it to an entity, and chunks appear.
 
 mod extent;
-mod fill;
 mod prepare;
-mod signs;
 mod volume;
 
 use core::fmt;
@@ -16,21 +14,17 @@ use bevy_ecs::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{DEFAULT_CHUNK_CELLS, Grid, MeshSettings, Region, Source};
+use marchless::{DEFAULT_CHUNK_CELLS, Region, Source};
 use thiserror::Error;
 
 pub use extent::{Extent, Keep};
-
-pub(crate) use fill::{FillResults, Repeat, fill_chunk};
-pub(crate) use prepare::prepare_terrains;
-pub(crate) use signs::Signs;
 pub use volume::TerrainVolume;
-pub(crate) use volume::{ChunkState, Edits, Fill, Group, MOST_STAMPS, Pending, same_samples};
 
 use crate::chunk::{Chunk, ChunkGeometry};
-use crate::schedule::MarchlessSystems;
+use crate::cover::{Coverage, Leaf, LeafState};
+use crate::schedule::Phase;
 use crate::source::Air;
-use crate::stream::{ask_for_samples, follow_viewers};
+use crate::volume::Recipe;
 
 /// A terrain, its settings and what it is made of.
 ///
@@ -40,8 +34,10 @@ use crate::stream::{ask_for_samples, follow_viewers};
 /// A terrain [of a fixed extent](Terrain::new) is loaded as a whole; an [endless](Terrain::endless) one where a
 /// [`TerrainViewer`](crate::stream::TerrainViewer) is near.
 ///
-/// Changing `source`, `extent`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone; changing
-/// `keep` loads and unloads chunks, and changing the other settings only meshes the terrain anew. Settings out of range are refused with an error in the log and a
+/// Changing `source`, `extent`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone. However often
+/// they change, what is under way is shown before the newest begins; stamps wait for it.
+/// Changing `keep` loads and unloads chunks. Another `isovalue` shows in one update, once all is meshed for it; other
+/// `normals` and another `palette` show chunk by chunk. Settings out of range are refused with an error in the log and a
 /// [`TerrainError`] component; those before them stay in effect.
 ///
 /// Outside of its extent there is air, so that its surface is closed, with flat walls at its border.
@@ -191,11 +187,6 @@ impl Terrain {
         Ok(())
     }
 
-    /// A grid for its chunks; the settings have been checked.
-    pub(crate) fn empty_grid(&self) -> Grid<i16> {
-        Grid::bounded(self.chunk_cells, self.chunk_region()).expect("the settings have been checked")
-    }
-
     /// The chunks that it has.
     pub(crate) fn chunk_region(&self) -> Region {
         self.extent.region(self.chunk_cells)
@@ -206,8 +197,29 @@ impl Terrain {
         self.keep.region(self.chunk_region(), self.chunk_cells)
     }
 
-    pub(crate) fn mesh_settings(&self) -> MeshSettings {
-        MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() }
+    /// What its samples are before anyone edits them.
+    pub(crate) fn recipe(&self) -> Recipe {
+        Recipe {
+            source: self.source.get().clone(),
+            extent: self.chunk_region(),
+            cells: self.chunk_cells,
+            spacing: f64::from(self.voxel_size),
+        }
+    }
+
+    /// Whether its samples, before any edit, are those of another one.
+    fn has_samples_of(&self, other: &Self) -> bool {
+        self.recipe().has_samples_of(&other.recipe())
+    }
+
+    /// Takes the settings of another one that ask for no other samples.
+    fn take_all_but_samples(&mut self, other: &Self) {
+        // What is kept goes with the extent: it has been checked with that of the other one.
+        if (self.extent, self.chunk_cells) == (other.extent, other.chunk_cells) {
+            self.keep = other.keep;
+        }
+        (self.isovalue, self.normals) = (other.isovalue, other.normals);
+        self.palette.clone_from(&other.palette);
     }
 }
 
@@ -351,7 +363,7 @@ impl Default for Palette {
     }
 }
 
-/// Keeps terrains' volumes: prepares them, follows their settings and fills them from their sources.
+/// Keeps terrains' volumes, and follows their settings.
 #[derive(Default)]
 pub struct TerrainPlugin;
 
@@ -360,21 +372,14 @@ impl Plugin for TerrainPlugin {
         crate::source::register_types(app);
         app.register_type::<Terrain>()
             .register_type::<TerrainVolume>()
-            .register_type::<crate::query::TerrainHit>()
             .register_type::<TerrainError>()
             .register_type::<Chunk>()
-            .register_type::<crate::stream::TerrainViewer>()
-            .register_type::<crate::stream::Leaf>()
-            .register_type::<crate::stream::Coverage>()
-            .register_type::<crate::stream::StreamStats>()
             .register_type::<ChunkGeometry>()
-            .init_resource::<FillResults>()
+            .register_type::<Leaf>()
+            .register_type::<LeafState>()
+            .register_type::<Coverage>()
             .add_observer(prepare::forget_despawned_chunk)
             .add_observer(prepare::forget_removed_terrain)
-            .add_systems(PostUpdate, (prepare_terrains, follow_viewers).chain().in_set(MarchlessSystems::Prepare))
-            .add_systems(
-                PostUpdate,
-                (fill::take_filled_chunks, ask_for_samples).chain().in_set(MarchlessSystems::Fill),
-            );
+            .add_systems(PostUpdate, prepare::prepare_terrains.in_set(Phase::Prepare));
     }
 }

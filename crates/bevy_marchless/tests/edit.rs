@@ -44,7 +44,7 @@ fn a_stamp_at_a_corner_of_chunks_changes_all_of_them_at_once() {
 fn what_changes_out_of_sight_is_shown_without_meshing() {
     let mut app = app();
     let terrain = settled(&mut app, ground());
-    let meshed = |app: &App| app.world().resource::<StreamStats>().meshed;
+    let meshed = |app: &App| app.world().resource::<TerrainStats>().meshed;
     let before = meshed(&app);
     let ball = |y: f32, radius: f32| BrushShape::sphere(Vec3::new(14.0, y, 14.0), radius);
     assert_eq!(changed_by(&mut app, Stamp::paint(terrain, ball(7.0, 3.0), 4)), [], "deep below ground");

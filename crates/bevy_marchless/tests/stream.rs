@@ -32,7 +32,7 @@ fn what_a_viewer_sees_is_loaded_and_goes_when_it_leaves() {
     assert_eq!(geometry(&mut app, terrain).len(), 0);
     assert_eq!(volume(&app, terrain).coverage(), Coverage::default());
     assert_eq!(volume(&app, terrain).grid().chunks().count(), 0, "nothing was edited");
-    let stats = *app.world().resource::<StreamStats>();
+    let stats = *app.world().resource::<TerrainStats>();
     assert_eq!(stats.loaded, stats.unloaded);
     assert!(stats.bounded > stats.filled && stats.filled > 0);
 }

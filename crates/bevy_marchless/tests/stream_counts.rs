@@ -29,8 +29,8 @@ fn hills() -> (App, Entity, Entity) {
     (app, terrain, viewer)
 }
 
-fn stats(app: &App) -> StreamStats {
-    *app.world().resource::<StreamStats>()
+fn stats(app: &App) -> TerrainStats {
+    *app.world().resource::<TerrainStats>()
 }
 
 /// How many updates it takes until everything is drawn.

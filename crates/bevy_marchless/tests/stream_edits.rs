@@ -249,10 +249,10 @@ fn going_to_and_fro_over_a_border_loads_nothing_twice() {
             }
         };
         to_and_fro(&mut flight, 1);
-        let before = *flight.app.world().resource::<StreamStats>();
+        let before = *flight.app.world().resource::<TerrainStats>();
         to_and_fro(&mut flight, 20);
-        let after = *flight.app.world().resource::<StreamStats>();
-        let work = |stats: StreamStats| (stats.loaded, stats.unloaded, stats.filled, stats.bounded, stats.meshed);
+        let after = *flight.app.world().resource::<TerrainStats>();
+        let work = |stats: TerrainStats| (stats.loaded, stats.unloaded, stats.filled, stats.bounded, stats.meshed);
         if again {
             assert!(
                 after.loaded > before.loaded && after.unloaded > before.unloaded,

@@ -33,7 +33,7 @@ fn counts_at_home(flight: &mut Flight) -> Counts {
         flight.app.world_mut().despawn(viewer);
     }
     flight.settle();
-    let stats = *flight.app.world().resource::<StreamStats>();
+    let stats = *flight.app.world().resource::<TerrainStats>();
     assert_eq!(stats.loaded, stats.unloaded, "nobody looks: {stats:?}");
     flight.spawn(Vec3::ZERO, Vec3::splat(2.0), 0.5);
     flight.settle_and_compare();
@@ -80,7 +80,7 @@ fn soak(legs: usize, seed: u64) {
                 number + 1,
                 resident.unwrap_or(0) >> 20,
                 flight.fresh.edited_chunks(),
-                *flight.app.world().resource::<StreamStats>(),
+                *flight.app.world().resource::<TerrainStats>(),
             );
         }
     }

@@ -19,14 +19,14 @@ pub(crate) struct PerSecond {
     /// Of the second that goes on: its slowest update, when it began, and what had been done by then.
     slowest_so_far: Duration,
     since: Duration,
-    before: StreamStats,
+    before: TerrainStats,
 }
 
 pub(crate) fn plugin(app: &mut App) {
     app.init_resource::<PerSecond>().add_systems(Update, count);
 }
 
-fn count(time: Res<Time<Real>>, stats: Res<StreamStats>, mut figures: ResMut<PerSecond>) {
+fn count(time: Res<Time<Real>>, stats: Res<TerrainStats>, mut figures: ResMut<PerSecond>) {
     figures.slowest_so_far = figures.slowest_so_far.max(stats.main_thread_last);
     if time.elapsed() < figures.since + Duration::from_secs(1) {
         return;

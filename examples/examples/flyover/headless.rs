@@ -58,13 +58,13 @@ fn fly(args: &Args, mut csv: Option<&mut Csv>) -> Result<String, String> {
     app.finish();
     app.cleanup();
 
-    let mut before = StreamStats::default();
+    let mut before = TerrainStats::default();
     let mut times = Vec::new();
     let start = Instant::now();
     for update in 0..args.frames {
         let began = Instant::now();
         app.update();
-        let stats = *app.world().resource::<StreamStats>();
+        let stats = *app.world().resource::<TerrainStats>();
         times.push(stats.main_thread_last);
         if let Some(csv) = csv.as_deref_mut() {
             csv.write(&line(update, &app, terrain, viewer, &stats, &before))?;
@@ -79,7 +79,14 @@ fn fly(args: &Args, mut csv: Option<&mut Csv>) -> Result<String, String> {
 }
 
 /// One line of [`COLUMNS`].
-fn line(update: u32, app: &App, terrain: Entity, viewer: Entity, stats: &StreamStats, before: &StreamStats) -> String {
+fn line(
+    update: u32,
+    app: &App,
+    terrain: Entity,
+    viewer: Entity,
+    stats: &TerrainStats,
+    before: &TerrainStats,
+) -> String {
     let place = app.world().get::<Transform>(viewer).map_or(Vec3::ZERO, |transform| transform.translation);
     let coverage = coverage(app, terrain);
     format!(
@@ -101,7 +108,7 @@ fn line(update: u32, app: &App, terrain: Entity, viewer: Entity, stats: &StreamS
 fn summary(app: &App, terrain: Entity, elapsed: Duration, mut times: Vec<Duration>) -> String {
     times.sort_unstable();
     let rank = |share: f64| milliseconds(times[((times.len() - 1) as f64 * share).round() as usize]);
-    let stats = app.world().resource::<StreamStats>();
+    let stats = app.world().resource::<TerrainStats>();
     let coverage = coverage(app, terrain);
     let bytes = diagnostic(app, &DebugPlugin::BYTES_PER_SURFACE_CHUNK);
     format!(

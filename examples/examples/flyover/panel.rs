@@ -32,7 +32,7 @@ struct Panel<'w, 's> {
     flight: ResMut<'w, Flight>,
     bounds: ResMut<'w, ShowChunkBounds>,
     diagnostics: Res<'w, DiagnosticsStore>,
-    stats: Res<'w, StreamStats>,
+    stats: Res<'w, TerrainStats>,
     per_second: Res<'w, PerSecond>,
     camera: Single<'w, 's, &'static Transform, With<FlyCamera>>,
 }

@@ -12,71 +12,39 @@
 //! ```
 //! With `MARCHLESS_RECORD=1` the table is written to `benches/record/`.
 
-mod clock;
 mod measure;
 mod record;
 mod route;
 
 use std::process::ExitCode;
 
+use marchless_plugin_benches::{PACE, Request, World};
+
 use measure::Flight;
-use route::{ROUTES, World};
-
-/// Updates a second.
-const PACE: u32 = 60;
-
-/// What the command line asks for.
-struct Request {
-    seconds: u32,
-    minutes: Option<u32>,
-    /// Whether all is only to be tried out.
-    test: bool,
-    word: Option<String>,
-}
+use route::ROUTES;
 
 fn main() -> ExitCode {
-    let request = match request(std::env::args().skip(1)) {
+    let request = match Request::parse(std::env::args().skip(1), &["--seconds", "--minutes"]) {
         Ok(request) => request,
         Err(error) => {
             eprintln!("{error}");
             return ExitCode::FAILURE;
         }
     };
-    if let Some(minutes) = request.minutes {
+    if let Some(minutes) = request.number("--minutes") {
         println!("{}", measure::long_flight(minutes));
         return ExitCode::SUCCESS;
     }
-    let updates = if request.test { 20 } else { request.seconds * PACE };
+    let updates = if request.test { 20 } else { request.number("--seconds").unwrap_or(20) * PACE };
     let mut flights = Vec::new();
     for world in World::ALL {
         for route in &ROUTES {
             let name = format!("{}, {}", world.name(), route.name);
-            if request.word.as_ref().is_none_or(|word| name.contains(word)) {
+            if request.includes(&name) {
                 eprintln!("{name}");
                 flights.push((name, Flight::fly(world, route, updates, !request.test)));
             }
         }
     }
     record::report(&flights)
-}
-
-fn request(arguments: impl Iterator<Item = String>) -> Result<Request, String> {
-    // As criterion does: without `cargo bench`, only whether it runs.
-    let mut request = Request { seconds: 20, minutes: None, test: true, word: None };
-    let mut arguments = arguments.peekable();
-    while let Some(argument) = arguments.next() {
-        let mut number = || {
-            let value = arguments.next().unwrap_or_default();
-            value.parse::<u32>().map_err(|_| format!("{argument} needs a number, but it is followed by {value:?}"))
-        };
-        match argument.as_str() {
-            "--seconds" => request.seconds = number()?.max(1),
-            "--minutes" => request.minutes = Some(number()?.max(1)),
-            "--test" => request.test = true,
-            "--bench" => request.test = false,
-            word if !word.starts_with('-') => request.word = Some(word.to_owned()),
-            _ => return Err(format!("unknown: {argument}; there are --seconds N, --minutes N, --test and a word")),
-        }
-    }
-    Ok(request)
 }

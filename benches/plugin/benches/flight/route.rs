@@ -1,41 +1,8 @@
-//! Worlds to fly through, and ways through them.
+//! Ways through worlds.
 
-use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
-
-use crate::PACE;
-
-/// What the world is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum World {
-    /// The default hills.
-    Hills,
-    /// The same, with caves in three dimensions.
-    Caves,
-}
-
-impl World {
-    pub(crate) const ALL: [Self; 2] = [Self::Hills, Self::Caves];
-
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Hills => "hills",
-            Self::Caves => "caves",
-        }
-    }
-
-    pub(crate) fn terrain(self) -> Terrain {
-        match self {
-            Self::Hills => Terrain::endless(NoiseHeights::default()),
-            Self::Caves => {
-                let ground = Some(NoiseHeightsSettings::default());
-                let settings = NoiseDensitySettings { ground, ..NoiseDensitySettings::default() };
-                Terrain::endless(NoiseDensity::new(settings).expect("the defaults are in range"))
-            }
-        }
-    }
-}
+use marchless_plugin_benches::PACE;
 
 /// A way through a world.
 pub(crate) struct Route {

@@ -2,20 +2,32 @@
 //!
 //! Bits are derived once, by whoever needs them first and on whatever thread, and shared from then on. Samples lie behind
 //! an `Arc` and are copied on write, so their address tells whether they have changed: the cache holds a `Weak`, because
-//! of which an edit has to move them to another address even where nobody else holds them.
+//! of which an edit has to move them to another address even where nobody else holds them. Bits of samples that are gone
+//! are pruned once they may be half of all.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
+use bevy_ecs::prelude::*;
 use marchless::bits::BitGrid;
 use marchless::{Chunk, ChunkSamples, Region, Samples, Shape, Weight as _};
 
 use super::TerrainBitsError;
-use crate::terrain::TerrainVolume;
+use super::part::Ground;
 
 /// The bits of those chunks of a terrain that somebody has asked for.
+#[derive(Component, Default)]
+pub(crate) struct BitsCache(Mutex<Entries>);
+
 #[derive(Default)]
-pub(crate) struct BitsCache(Mutex<BTreeMap<[i32; 3], Entry>>);
+struct Entries {
+    chunks: BTreeMap<[i32; 3], Entry>,
+    /// When there are this many, those of samples that are gone are pruned.
+    prune_at: usize,
+}
+
+/// The bits of this many chunks are kept without looking which of them are stale.
+const FEW: usize = 64;
 
 struct Entry {
     /// What the bits are derived from.
@@ -50,30 +62,24 @@ pub(super) struct Recipe {
 }
 
 impl BitsCache {
-    /// Forgets all bits.
-    pub(crate) fn clear(&self) {
-        self.lock().clear();
-    }
-
-    /// Forgets the bits of a chunk whose samples are gone.
-    pub(crate) fn forget(&self, position: [i32; 3]) {
-        self.lock().remove(&position);
-    }
-
     /// Where the bits of a chunk with these samples are, or will be.
     fn place(&self, position: [i32; 3], samples: &Arc<ChunkSamples<i16>>, recipe: Recipe) -> Arc<OnceLock<Derived>> {
         let mut entries = self.lock();
         let is_current =
             |entry: &&Entry| core::ptr::eq(entry.samples.as_ptr(), Arc::as_ptr(samples)) && entry.recipe == recipe;
-        if let Some(entry) = entries.get(&position).filter(is_current) {
+        if let Some(entry) = entries.chunks.get(&position).filter(is_current) {
             return entry.bits.clone();
         }
         let bits = Arc::<OnceLock<Derived>>::default();
-        entries.insert(position, Entry { samples: Arc::downgrade(samples), recipe, bits: bits.clone() });
+        if entries.chunks.len() >= entries.prune_at {
+            entries.chunks.retain(|_, entry| entry.samples.strong_count() > 0);
+            entries.prune_at = 2 * entries.chunks.len() + FEW;
+        }
+        entries.chunks.insert(position, Entry { samples: Arc::downgrade(samples), recipe, bits: bits.clone() });
         bits
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<[i32; 3], Entry>> {
+    fn lock(&self) -> MutexGuard<'_, Entries> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -83,17 +89,18 @@ impl ChunkBits {
     ///
     /// # Errors
     /// [`TerrainBitsError::NotFilled`].
-    pub(super) fn new(volume: &TerrainVolume, isovalue: f32, position: [i32; 3]) -> Result<Self, TerrainBitsError> {
-        match volume.grid.chunk(position) {
+    pub(super) fn new(
+        Ground { grid, cache, isovalue }: Ground<'_>,
+        position: [i32; 3],
+    ) -> Result<Self, TerrainBitsError> {
+        match grid.chunk(position) {
             None => Err(TerrainBitsError::NotFilled { chunk: position.into() }),
             Some(Chunk::Uniform(voxel)) => Ok(Self::Uniform(voxel.weight.to_voxels() < isovalue)),
             Some(Chunk::Samples(samples)) => {
-                let lowest = volume
-                    .grid
-                    .bounds()
-                    .map_or([false; 3], |bounds| [0, 1, 2].map(|axis| position[axis] == bounds.min[axis]));
-                let recipe = Recipe { isovalue, cells: volume.grid.chunk_cells(), lowest };
-                let bits = volume.bits.place(position, samples, recipe);
+                let lowest =
+                    grid.bounds().map_or([false; 3], |bounds| [0, 1, 2].map(|axis| position[axis] == bounds.min[axis]));
+                let recipe = Recipe { isovalue, cells: grid.chunk_cells(), lowest };
+                let bits = cache.place(position, samples, recipe);
                 Ok(Self::Lazy { samples: samples.clone(), recipe, bits })
             }
         }
@@ -142,8 +149,12 @@ mod tests {
     use super::*;
     use marchless::{Grid, Voxel};
 
-    fn place(volume: &TerrainVolume, isovalue: f32) -> Arc<OnceLock<Derived>> {
-        match ChunkBits::new(volume, isovalue, [0; 3]).expect("it is filled") {
+    fn one_chunk() -> Grid<i16> {
+        Grid::bounded(8, Region::new([0; 3], [1; 3])).unwrap()
+    }
+
+    fn place(grid: &Grid<i16>, cache: &BitsCache, isovalue: f32) -> Arc<OnceLock<Derived>> {
+        match ChunkBits::new(Ground { grid, cache, isovalue }, [0; 3]).expect("it is filled") {
             ChunkBits::Lazy { bits, .. } => bits,
             ChunkBits::Uniform(_) => panic!("it has samples"),
         }
@@ -151,37 +162,44 @@ mod tests {
 
     #[test]
     fn bits_are_shared_until_the_samples_change() {
-        let mut volume =
-            TerrainVolume { grid: Grid::bounded(8, Region::new([0; 3], [1; 3])).unwrap(), ..Default::default() };
+        let (mut grid, cache) = (one_chunk(), BitsCache::default());
         let solid = Voxel::new(-256, 0);
-        volume.grid.set([3, 3, 3], solid).unwrap();
+        grid.set([3, 3, 3], solid).unwrap();
         // With nobody else who holds the samples, and with somebody.
-        for others in [vec![], vec![volume.grid.clone()]] {
-            let first = place(&volume, 0.0);
-            assert!(Arc::ptr_eq(&first, &place(&volume, 0.0)), "asked for twice");
-            let with_other_isovalue = place(&volume, 0.25);
+        for others in [vec![], vec![grid.clone()]] {
+            let first = place(&grid, &cache, 0.0);
+            assert!(Arc::ptr_eq(&first, &place(&grid, &cache, 0.0)), "asked for twice");
+            let with_other_isovalue = place(&grid, &cache, 0.25);
             assert!(!Arc::ptr_eq(&first, &with_other_isovalue));
-            volume.grid.set([4, 4, 4], solid).unwrap();
-            let after = place(&volume, 0.25);
+            grid.set([4, 4, 4], solid).unwrap();
+            let after = place(&grid, &cache, 0.25);
             assert!(!Arc::ptr_eq(&with_other_isovalue, &after));
-            volume.grid.set([4, 4, 4], Voxel::AIR).unwrap();
-            assert!(!Arc::ptr_eq(&after, &place(&volume, 0.25)), "as before, but not known to be");
+            grid.set([4, 4, 4], Voxel::AIR).unwrap();
+            assert!(!Arc::ptr_eq(&after, &place(&grid, &cache, 0.25)), "as before, but not known to be");
             drop(others);
         }
-        volume.bits.clear();
-        assert!(volume.bits.lock().is_empty());
+    }
+
+    #[test]
+    fn bits_of_samples_that_are_gone_are_pruned() {
+        let (mut grid, cache) = (Grid::new(8).unwrap(), BitsCache::default());
+        for x in 0..1_000 {
+            grid.set([8 * x, 0, 0], Voxel::new(-256, 0)).unwrap();
+            ChunkBits::new(Ground { grid: &grid, cache: &cache, isovalue: 0.0 }, [x, 0, 0]).unwrap();
+            grid.unload([x, 0, 0]);
+        }
+        assert!(cache.lock().chunks.len() <= FEW);
     }
 
     #[test]
     fn a_chunk_that_is_uniform_costs_no_bits() {
-        let mut volume =
-            TerrainVolume { grid: Grid::bounded(8, Region::new([0; 3], [1; 3])).unwrap(), ..Default::default() };
-        volume.grid.insert([0; 3], Chunk::AIR).unwrap();
-        assert!(matches!(ChunkBits::new(&volume, 0.0, [0; 3]), Ok(ChunkBits::Uniform(false))));
-        assert!(volume.bits.lock().is_empty());
+        let (mut grid, cache) = (one_chunk(), BitsCache::default());
+        grid.insert([0; 3], Chunk::AIR).unwrap();
+        let bits = |grid: &Grid<i16>| ChunkBits::new(Ground { grid, cache: &cache, isovalue: 0.0 }, [0; 3]);
+        assert!(matches!(bits(&grid), Ok(ChunkBits::Uniform(false))));
+        assert!(cache.lock().chunks.is_empty());
         // Samples that differ, but are all air.
-        volume.grid.set([3, 3, 3], Voxel::new(256, 0)).unwrap();
-        let bits = ChunkBits::new(&volume, 0.0, [0; 3]).unwrap();
-        assert!(matches!(bits.get(), Ok(Derived::Uniform(false))));
+        grid.set([3, 3, 3], Voxel::new(256, 0)).unwrap();
+        assert!(matches!(bits(&grid).unwrap().get(), Ok(Derived::Uniform(false))));
     }
 }

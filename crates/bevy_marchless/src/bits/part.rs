@@ -1,12 +1,20 @@
 //! [`Part`]: what a question reads of one chunk.
 
 use bevy_math::DVec3;
-use marchless::Region;
 use marchless::bits::BitGrid;
+use marchless::{Grid, Region};
 
 use super::TerrainBitsError;
-use super::cache::{ChunkBits, Derived};
-use crate::terrain::TerrainVolume;
+use super::cache::{BitsCache, ChunkBits, Derived};
+
+/// What is solid in a terrain, and where the bits of it are kept.
+#[derive(Clone, Copy)]
+pub(super) struct Ground<'a> {
+    pub(super) grid: &'a Grid<i16>,
+    pub(super) cache: &'a BitsCache,
+    /// In voxels.
+    pub(super) isovalue: f32,
+}
 
 /// What a question reads of one chunk; everything in the terrain's lattice.
 #[derive(Clone, Debug)]
@@ -19,27 +27,24 @@ pub(super) struct Part {
 }
 
 /// What of `region` lies within the terrain's outermost planes: on them and beyond, all is air.
-pub(super) fn within(volume: &TerrainVolume, region: Region) -> Region {
-    let Some(planes) = volume.grid.planes() else { return NOTHING };
+pub(super) fn within(grid: &Grid<i16>, region: Region) -> Region {
+    let Some(planes) = grid.planes() else { return NOTHING };
     Region::new(planes.min.map(|v| v + 1), planes.max).intersection(&region)
 }
 
 /// What `region` has in common with each chunk; beyond the chunks all is air.
-pub(super) fn parts(
-    volume: &TerrainVolume,
-    isovalue: f32,
-    region: Region,
-) -> impl Iterator<Item = Result<Part, TerrainBitsError>> + '_ {
-    let inside = within(volume, region);
+pub(super) fn parts(ground: Ground<'_>, region: Region) -> impl Iterator<Item = Result<Part, TerrainBitsError>> + '_ {
+    let Ground { grid, .. } = ground;
+    let inside = within(grid, region);
     let chunks = if inside.is_empty() {
         NOTHING
     } else {
-        let last = volume.grid.chunk_of(inside.max.map(|v| v - 1));
-        Region::new(volume.grid.chunk_of(inside.min), last.map(|v| v + 1))
+        let last = grid.chunk_of(inside.max.map(|v| v - 1));
+        Region::new(grid.chunk_of(inside.min), last.map(|v| v + 1))
     };
     chunks.points().map(move |position| {
-        let chunk = volume.grid.chunk_region(position);
-        let bits = ChunkBits::new(volume, isovalue, position)?;
+        let chunk = grid.chunk_region(position);
+        let bits = ChunkBits::new(ground, position)?;
         Ok(Part { region: chunk.intersection(&inside), origin: chunk.min, bits })
     })
 }

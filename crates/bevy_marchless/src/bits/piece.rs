@@ -6,11 +6,11 @@ use std::sync::Arc;
 use bevy_ecs::entity::Entity;
 use bevy_math::IVec3;
 use marchless::bits::{BitGrid, Component, Connectivity};
-use marchless::{Region, Voxel, Weight as _};
+use marchless::{Grid, Region, Voxel, Weight as _};
 
 use crate::brush::{BrushShape, Stamp};
 use crate::mesh::ChunkSamples;
-use crate::terrain::{Terrain, TerrainVolume};
+use crate::terrain::Terrain;
 
 /// A part of what is solid in a box of a terrain that hangs together, as it was when it was found.
 #[derive(Clone)]
@@ -74,14 +74,14 @@ impl Piece {
     }
 
     /// Its samples as they are in the terrain now, with two points of air on each side.
-    pub(super) fn samples(&self, volume: &TerrainVolume, settings: &Terrain) -> ChunkSamples {
+    pub(super) fn samples(&self, grid: &Grid<i16>, settings: &Terrain) -> ChunkSamples {
         let (own, region, isovalue) = (self.bits(), self.bounds.grown(RIM, RIM), settings.isovalue);
         let is_own = |point: [i32; 3]| {
             let place = [0, 1, 2].map(|axis| u32::try_from(point[axis] - self.bounds.min[axis]).unwrap_or(u32::MAX));
             own.get(place)
         };
         let voxel = |point| {
-            let voxel = volume.grid.get(point);
+            let voxel = grid.get(point);
             let weight = voxel.weight.to_voxels();
             if weight >= isovalue || is_own(point) {
                 return voxel;

@@ -13,7 +13,7 @@ use bevy_transform::TransformSystems;
 use bevy_transform::components::GlobalTransform;
 
 use crate::chunk::{Chunk, ChunkGeometry, chunk_transform};
-use crate::stream::LeafState;
+use crate::cover::LeafState;
 use crate::terrain::TerrainVolume;
 
 /// Whether the bounds of chunks are drawn. Default: no.
@@ -92,7 +92,7 @@ fn draw_others(volumes: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos: G
         let cells = settings.chunk_cells;
         let middle = Vec3::splat(0.5 * cells as f32);
         let mark = 0.5 * EMPTY_SHARE * cells as f32;
-        for leaf in volume.chunks.keys().filter_map(|key| volume.leaf_at(IVec3::from(key.position))) {
+        for leaf in volume.heart().table().keys().filter_map(|key| volume.leaf_at(IVec3::from(key.position))) {
             let transform =
                 to_world.mul_transform(chunk_transform(leaf.position.to_array(), cells, settings.voxel_size));
             match leaf.state {

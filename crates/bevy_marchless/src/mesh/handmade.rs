@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bevy_camera::primitives::Aabb;
 use bevy_camera::visibility::{NoAutoAabb, Visibility};
+use bevy_ecs::change_detection::Tick;
 use bevy_ecs::prelude::*;
 use bevy_math::UVec3;
 use bevy_mesh::Mesh3d;
@@ -13,11 +14,12 @@ use marchless::{MeshSettings, Samples, SamplesError, Shape, ShapeError, Weight};
 use thiserror::Error;
 
 use super::Screen;
-use super::job::{Meshed, mesh_with};
+use super::job::mesh_with;
 use crate::chunk::ChunkGeometry;
+use crate::jobs::{Priority, Results, Ticket, WorkQueue};
 use crate::schedule::MarchlessSettings;
 use crate::terrain::Palette;
-use crate::work::{Priority, Results, Ticket, WorkQueue, new_number};
+use crate::volume::Meshed;
 
 /// Samples of your own: insert them on any entity, and their mesh appears, and again after each change.
 ///
@@ -148,38 +150,34 @@ pub enum ChunkSamplesError {
 }
 
 /// What is being done with an entity's samples.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Default)]
 pub(super) struct MeshingState {
+    /// When the samples that were looked at last had been changed: so no change is missed while the entity is disabled.
+    seen: Option<Tick>,
+    /// Whether these samples are still to be meshed.
     changed: bool,
-    /// The job that meshes an earlier state, and its number; its result is shown, and the newest comes next.
-    job: Option<(u64, Ticket)>,
+    /// The job that meshes an earlier state, and where it leaves the mesh; that is shown, and the newest comes next.
+    job: Option<(Ticket, Results<Meshed>)>,
 }
-
-/// What the jobs have meshed: whose mesh, the job's number, the mesh.
-#[derive(Resource, Default)]
-pub(super) struct HandmadeResults(Results<(Entity, u64, Meshed)>);
 
 /// Meshes changed samples: small ones at once, others in jobs, one at a time for each entity.
 pub(super) fn mesh_samples(
     mut chunks: Query<(Entity, Ref<ChunkSamples>, &mut MeshingState)>,
     queue: Res<WorkQueue>,
-    results: Res<HandmadeResults>,
     settings: Res<MarchlessSettings>,
     mut screen: Screen,
 ) {
-    for (entity, number, meshed) in results.0.take() {
-        // Samples that were removed and inserted again want no mesh of the former ones.
-        if let Ok((_, samples, mut state)) = chunks.get_mut(entity)
-            && state.job.as_ref().is_some_and(|(asked_for, _)| *asked_for == number)
-        {
-            state.job = None;
-            show(entity, &samples, meshed, &mut screen);
-        }
-    }
     let mut cells_left = settings.inline_chunks.saturating_mul(32 * 32 * 32);
     for (entity, samples, mut state) in &mut chunks {
-        if samples.is_changed() {
-            state.changed = true;
+        let changed_at = samples.last_changed();
+        if state.seen == Some(changed_at) && !state.changed && state.job.is_none() {
+            continue;
+        }
+        let state = &mut *state;
+        state.changed |= state.seen.replace(changed_at) != Some(changed_at);
+        if let Some(meshed) = state.job.as_ref().and_then(|(_, results)| results.take().pop()) {
+            state.job = None;
+            show(entity, &samples, meshed, &mut screen);
         }
         if !state.changed || state.job.is_some() {
             continue;
@@ -190,15 +188,15 @@ pub(super) fn mesh_samples(
             cells_left -= samples.weights().len();
             show(entity, &samples, job(), &mut screen);
         } else {
-            let (number, results) = (new_number(), results.0.clone());
-            let ticket = queue.push(Priority::Edit, move || results.push((entity, number, job())));
-            state.job = Some((number, ticket));
+            let results = Results::default();
+            let made = results.clone();
+            state.job = Some((queue.push(Priority::Edit, move || made.push(job())), results));
         }
     }
 }
 
 fn show(entity: Entity, samples: &ChunkSamples, meshed: Meshed, screen: &mut Screen) {
-    screen.count_mesh(meshed.time);
+    screen.stats.count_mesh(meshed.time);
     screen.show(entity, meshed, (samples.shape() - 1).to_array());
 }
 

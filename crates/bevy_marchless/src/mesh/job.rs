@@ -3,7 +3,6 @@
 use core::cell::RefCell;
 use core::iter;
 use core::sync::atomic::{AtomicUsize, Ordering};
-use core::time::Duration;
 use std::sync::Arc;
 
 use bevy_asset::RenderAssetUsages;
@@ -15,26 +14,7 @@ use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, Neighbourhoo
 
 use super::ATTRIBUTE_MATERIAL;
 use super::rooms::{AssetRoom, MeshRoom, MeshRooms};
-
-/// The linear colours of all materials.
-pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
-
-/// A chunk's new mesh.
-pub(crate) struct Meshed {
-    pub(crate) position: [i32; 3],
-    pub(crate) geometry: Arc<MeshBuffer>,
-    /// The same as an asset, where assets are wanted and there is something to draw.
-    pub(crate) mesh: Option<Mesh>,
-    /// How long it took.
-    pub(crate) time: Duration,
-}
-
-impl Meshed {
-    /// Nothing to draw.
-    pub(crate) fn empty(position: [i32; 3]) -> Self {
-        Self { position, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
-    }
-}
+use crate::volume::{Colors, Meshed};
 
 /// Meshes a chunk. `colors`: of its vertices; `None` where no asset is wanted. `rooms`: memory for the mesh; without it,
 /// the mesh takes no more than it needs.
@@ -74,6 +54,13 @@ pub(crate) fn mesh_now(
     meshed.extend(helped.into_iter().flatten());
     meshed.sort_by_key(|meshed| meshed.position);
     meshed
+}
+
+/// The same mesh in other colours.
+pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, colors: &Colors) -> Meshed {
+    let start = Instant::now();
+    let mesh = Some(to_asset(&geometry, colors, AssetRoom::default()));
+    Meshed { position, geometry, mesh, time: start.elapsed() }
 }
 
 /// Runs `mesh` with this thread's scratch memory, and makes an asset of what comes out. A failure is reported and

@@ -1,133 +1,119 @@
 //! Gives new terrains a volume and chunks, and follows changes of their settings.
 
+use bevy_ecs::entity_disabling::Disabled;
+use bevy_ecs::prelude::*;
+use bevy_ecs::query::Allow;
+use bevy_platform::time::Instant;
+use bevy_transform::components::Transform;
 use std::sync::Arc;
 
-use bevy_ecs::prelude::*;
-use bevy_transform::components::Transform;
-
-use super::{Fill, Signs, Terrain, TerrainError, TerrainVolume};
+use super::{Terrain, TerrainError, TerrainVolume};
+use crate::budget::FrameBudget;
 use crate::chunk::{Chunk, ChunkKey, chunk_transform};
-use crate::stats::MainThread;
-use crate::work::new_number;
+use crate::schedule::MakesMeshes;
+use crate::volume::Heart;
 
 /// Checks terrains that are new or whose settings changed, and does what the change asks for.
+///
+/// When settings were changed is compared with when those looked at last were, so that no change is missed that was made
+/// while the terrain was disabled.
 pub(crate) fn prepare_terrains(
-    mut terrains: Query<(Entity, &Terrain, &mut TerrainVolume, Has<TerrainError>), Changed<Terrain>>,
+    mut terrains: Query<(Entity, Ref<Terrain>, &mut TerrainVolume, Has<TerrainError>)>,
     mut transforms: Query<&mut Transform, With<Chunk>>,
+    meshes: Option<Res<MakesMeshes>>,
     mut commands: Commands,
-    mut main_thread: ResMut<MainThread>,
+    mut budget: ResMut<FrameBudget>,
 ) {
-    let start = main_thread.start();
+    let start = Instant::now();
     for (entity, terrain, mut volume, was_refused) in &mut terrains {
-        if let Err(error) = terrain.check() {
-            bevy_log::error!("terrain {entity}: {error}; its settings are not applied");
-            commands.entity(entity).try_insert(error);
-            continue;
-        }
-        if was_refused {
-            commands.entity(entity).try_remove::<TerrainError>();
-        }
-        let before = volume.settings.replace(terrain.clone());
-        volume.colors = Arc::new(terrain.palette.to_vertex_colors());
-        match &before {
-            Some(old) if same_samples(old, terrain) => {
-                if old.isovalue != terrain.isovalue {
-                    volume.chunks.values_mut().for_each(|state| state.signs = Signs::UNKNOWN);
-                }
-                if !same_meshes(old, terrain) {
-                    let all = volume.chunks.keys().map(|key| key.position).collect();
-                    volume.add_changed(all, None);
-                }
-            }
-            Some(old) if same_chunks(old, terrain) => {
-                for (key, state) in &volume.chunks {
-                    if let Some(mut transform) = state.entity.and_then(|entity| transforms.get_mut(entity).ok()) {
-                        *transform = chunk_transform(key.position, terrain.chunk_cells, terrain.voxel_size);
+        if volume.is_new(terrain.last_changed()) {
+            let volume = &mut *volume;
+            match terrain.check() {
+                Ok(()) => {
+                    if was_refused {
+                        commands.entity(entity).try_remove::<TerrainError>();
                     }
+                    volume.accept(&terrain, terrain.last_changed());
+                    follow_settings(volume);
                 }
-                refill(terrain, &mut volume);
+                Err(error) => {
+                    bevy_log::error!("terrain {entity}: {error}; its settings are not applied");
+                    commands.entity(entity).try_insert(error);
+                    volume.refuse(terrain.last_changed());
+                }
             }
-            _ => start_over(terrain, &mut volume, &mut commands),
+        }
+        if volume.has_next()
+            && let Some((terrain, before)) = volume.take_next()
+        {
+            match before {
+                Some(before) if before.recipe().has_places_of(&terrain.recipe()) => {
+                    if before.voxel_size != terrain.voxel_size {
+                        place_chunks(&terrain, volume.heart(), &mut transforms);
+                    }
+                    volume.heart_mut().refill(terrain.recipe(), terrain.isovalue);
+                    follow_settings(&mut volume);
+                }
+                _ => start_over(&terrain, &mut volume, meshes.is_some(), &mut commands),
+            }
         }
     }
-    main_thread.stop(start);
+    budget.spend(start);
+}
+
+/// Follows all settings that ask for no other samples.
+fn follow_settings(volume: &mut TerrainVolume) {
+    let Some(settings) = volume.settings() else { return };
+    let (isovalue, normals, colors) = (settings.isovalue, settings.normals, settings.palette.to_vertex_colors());
+    let heart = volume.heart_mut();
+    if heart.mesh_settings().normals != normals || **heart.colors() != colors {
+        heart.set_look(normals, Arc::new(colors));
+    }
+    heart.set_isovalue(isovalue);
 }
 
 /// Forgets all chunks; those in range come back by themselves.
-fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, commands: &mut Commands) {
-    let former = core::mem::take(volume);
-    despawn_chunks(&former, commands);
-    volume.settings = former.settings;
-    volume.colors = former.colors;
-    volume.grid = terrain.empty_grid();
-    volume.shown = terrain.empty_grid();
-    volume.shown_isovalue = terrain.isovalue;
-    volume.filling = new_number();
+fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, meshing: bool, commands: &mut Commands) {
+    let colors = Arc::new(terrain.palette.to_vertex_colors());
+    let former = volume.start_over(Heart::new(terrain.recipe(), terrain.isovalue, terrain.normals, colors, meshing));
+    despawn_chunks(former, commands);
 }
 
-/// Asks for new samples of all chunks. What is drawn stays until each chunk's new mesh is there.
-fn refill(terrain: &Terrain, volume: &mut TerrainVolume) {
-    let extent = terrain.chunk_region();
-    volume.forget_work();
-    volume.grid = terrain.empty_grid();
-    volume.edited.clear();
-    volume.stamps.clear();
-    volume.bits.clear();
-    volume.filling = new_number();
-    volume.unfilled = volume.chunks.len();
-    for (key, state) in &mut volume.chunks {
-        state.fill = Fill::Unasked;
-        state.signs = Signs::UNKNOWN;
-        state.missing = key.around().filter(|near| extent.contains(near.position)).count() as u8;
-        state.stale = state.drawn && !state.hidden;
+/// Moves what is drawn of a terrain whose voxels have another size.
+fn place_chunks(terrain: &Terrain, heart: &Heart, transforms: &mut Query<&mut Transform, With<Chunk>>) {
+    for (key, entity) in heart.table().entities() {
+        if let Ok(mut transform) = transforms.get_mut(entity) {
+            *transform = chunk_transform(key.position, terrain.chunk_cells, terrain.voxel_size);
+        }
     }
-    let all: Vec<ChunkKey> = volume.chunks.keys().copied().collect();
-    volume.streaming.refill(all.into_iter());
 }
 
 /// A despawned chunk is drawn no more. Its samples stay: its neighbours' meshes need them.
 pub(crate) fn forget_despawned_chunk(
     removed: On<Remove, Chunk>,
-    chunks: Query<&Chunk>,
-    mut volumes: Query<&mut TerrainVolume>,
+    chunks: Query<&Chunk, Allow<Disabled>>,
+    mut volumes: Query<&mut TerrainVolume, Allow<Disabled>>,
 ) {
     let Ok(chunk) = chunks.get(removed.entity) else { return };
     let Ok(mut volume) = volumes.get_mut(chunk.terrain) else { return };
     let key = ChunkKey { level: chunk.level, position: chunk.position.to_array() };
-    if let Some(state) = volume.chunks.get_mut(&key).filter(|state| state.entity == Some(removed.entity)) {
-        (state.entity, state.hidden) = (None, true);
-        (state.drawn, state.empty, state.stale) = (true, true, false);
-    }
+    volume.heart_mut().despawned(key, removed.entity);
 }
 
 /// Without its `Terrain` an entity is no terrain: its chunks and samples go.
 pub(crate) fn forget_removed_terrain(
     removed: On<Remove, Terrain>,
-    mut volumes: Query<&mut TerrainVolume>,
+    mut volumes: Query<&mut TerrainVolume, Allow<Disabled>>,
     mut commands: Commands,
 ) {
     let Ok(mut volume) = volumes.get_mut(removed.entity) else { return };
-    let former = core::mem::take(&mut *volume);
-    despawn_chunks(&former, &mut commands);
+    let mut former = core::mem::take(&mut *volume);
+    despawn_chunks(core::mem::take(former.heart_mut()), &mut commands);
 }
 
-fn despawn_chunks(volume: &TerrainVolume, commands: &mut Commands) {
-    for chunk in volume.chunks.values().filter_map(|state| state.entity) {
-        commands.entity(chunk).try_despawn();
+fn despawn_chunks(mut former: Heart, commands: &mut Commands) {
+    let shown: Vec<Entity> = former.table().entities().map(|(_, entity)| entity).collect();
+    for entity in shown.into_iter().chain(former.take_released()) {
+        commands.entity(entity).try_despawn();
     }
-}
-
-/// Whether chunks have the same places.
-fn same_chunks(a: &Terrain, b: &Terrain) -> bool {
-    a.extent == b.extent && a.chunk_cells == b.chunk_cells
-}
-
-/// Whether both are the same before any edit.
-fn same_samples(a: &Terrain, b: &Terrain) -> bool {
-    a.source == b.source && same_chunks(a, b) && a.voxel_size == b.voxel_size
-}
-
-/// Whether the same samples look the same.
-fn same_meshes(a: &Terrain, b: &Terrain) -> bool {
-    a.isovalue == b.isovalue && a.normals == b.normals && a.palette == b.palette
 }

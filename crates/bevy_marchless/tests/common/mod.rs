@@ -10,10 +10,11 @@ use std::time::Duration;
 
 use bevy_app::{App, TaskPoolPlugin};
 use bevy_asset::{AssetPlugin, Assets};
+use bevy_color::ColorToComponents as _;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
-use bevy_mesh::{Mesh, MeshPlugin};
+use bevy_mesh::{Mesh, Mesh3d, MeshPlugin, VertexAttributeValues};
 use bevy_transform::TransformPlugin;
 use bevy_transform::components::Transform;
 use marchless::{MeshBuffer, MeshReport};
@@ -120,6 +121,45 @@ pub fn assert_drawn(app: &mut App, terrain: Entity) {
     for (position, mesh) in expected {
         let found = drawn.iter().find(|(at, _)| *at == position);
         assert_eq!(*found.map(|(_, mesh)| mesh.clone()).unwrap_or_default(), mesh, "chunk {position}");
+    }
+}
+
+/// Asserts that what is drawn is what a new terrain of the same settings would show after these stamps. The terrain is bounded.
+pub fn assert_as_new(app: &mut App, terrain: Entity, stamps: &[Stamp]) {
+    let settings = app.world().get::<Terrain>(terrain).expect("a terrain").clone();
+    let mut fresh = stream::Fresh::new(&settings);
+    for stamp in stamps {
+        fresh.stamp(&stamp.quantised().expect("numbers in range"));
+    }
+    let mut drawn: std::collections::BTreeMap<_, _> =
+        geometry(app, terrain).into_iter().map(|(position, mesh)| (position.to_array(), mesh)).collect();
+    for position in fresh.extent().points() {
+        let mesh = drawn.remove(&position).unwrap_or_default();
+        assert!(*mesh == fresh.mesh(position), "the chunk at {position:?} is not as in a new terrain");
+    }
+    assert!(drawn.is_empty(), "chunks outside of the extent: {:?}", drawn.keys());
+    assert_coloured(app, terrain);
+}
+
+/// Asserts that the mesh assets of all chunks have the vertices of their geometry, in the palette's colours.
+pub fn assert_coloured(app: &mut App, terrain: Entity) {
+    let palette = app.world().get::<Terrain>(terrain).expect("a terrain").palette.clone();
+    let mut chunks = app.world_mut().query::<(&Chunk, &ChunkGeometry, Option<&Mesh3d>)>();
+    let assets = app.world().resource::<Assets<Mesh>>();
+    for (chunk, geometry, mesh) in chunks.iter(app.world()).filter(|(chunk, ..)| chunk.terrain == terrain) {
+        let geometry = &geometry.mesh;
+        assert_eq!(mesh.is_some(), !geometry.is_empty(), "chunk {}", chunk.position);
+        let Some(mesh) = mesh else { continue };
+        let mesh = assets.get(&mesh.0).expect("the asset of a chunk");
+        assert_eq!(mesh.count_vertices(), geometry.positions.len(), "chunk {}", chunk.position);
+        assert_eq!(mesh.contains_attribute(Mesh::ATTRIBUTE_NORMAL), !geometry.normals.is_empty());
+        let colors: Vec<[f32; 4]> =
+            geometry.materials.iter().map(|m| palette.color(*m).to_linear().to_f32_array()).collect();
+        let found = mesh.attribute(Mesh::ATTRIBUTE_COLOR).and_then(|values| match values {
+            VertexAttributeValues::Float32x4(values) => Some(values),
+            _ => None,
+        });
+        assert!(found == Some(&colors), "the colours of chunk {}", chunk.position);
     }
 }
 

@@ -1,4 +1,4 @@
-//! [`Look`]: which chunks a viewer asks for.
+//! [`Look`]: what a viewer sees of a terrain.
 
 use bevy_ecs::prelude::*;
 use bevy_math::{DAffine3, Vec3};
@@ -6,7 +6,7 @@ use bevy_platform::collections::HashSet;
 use bevy_transform::components::GlobalTransform;
 
 use super::TerrainViewer;
-use super::range::{Range, Viewed};
+use crate::cover::{Range, View};
 use crate::terrain::Terrain;
 
 /// Viewers' positions are rounded to this part of a chunk, so that small steps change nothing.
@@ -31,8 +31,8 @@ impl Look<'_> {
         viewer: Entity,
         settings: &TerrainViewer,
         place: &GlobalTransform,
-        known: Option<(TerrainViewer, Viewed)>,
-    ) -> Option<Viewed> {
+        known: Option<(TerrainViewer, View)>,
+    ) -> Option<View> {
         let Some(to_terrain) = self.to_terrain.filter(|to_terrain| to_terrain.is_finite()) else {
             self.warn(terrain, terrain, || {
                 format!("terrain {terrain} cannot be followed: its transform has no inverse")
@@ -43,7 +43,7 @@ impl Look<'_> {
         let position = place.translation();
         let at = to_terrain.transform_point3(position.as_dvec3()) / (f64::from(self.terrain.voxel_size) * cells);
         let at = at.to_array();
-        // Not `min`, which would make a number of what is none.
+        // `f64::min` would turn NaN into a number.
         let radii = settings.radii.as_dvec3().to_array().map(|v| if v > FARTHEST { FARTHEST } else { v } / cells);
         let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
         if !at.iter().all(|v| v.is_finite()) {
@@ -72,7 +72,7 @@ impl Look<'_> {
         if let Some((as_before, viewed)) = known
             && (as_before, viewed.range.middle(), viewed.range.extent()) == (*settings, middle, extent)
         {
-            return Some(Viewed { forward, ..viewed });
+            return Some(viewed.facing(forward));
         }
         let whole = Range::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
         let range = limited(whole);
@@ -91,7 +91,7 @@ impl Look<'_> {
         // Where all that may be loaded lies within, none are dropped.
         let drops = samples < range.longest() + margin + 2.0;
         let samples = drops.then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
-        Some(Viewed { range, margin, samples, forward })
+        Some(View::new(range, margin, samples, forward))
     }
 
     fn warn(&mut self, terrain: Entity, about: Entity, text: impl FnOnce() -> String) {

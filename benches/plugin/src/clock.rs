@@ -4,14 +4,14 @@ use std::time::Duration;
 
 /// How long this thread has been running, without the time it waited for a processor.
 #[cfg(unix)]
-pub(crate) fn thread_time() -> Duration {
+pub fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
 /// Elsewhere, the time on the wall.
 #[cfg(not(unix))]
-pub(crate) fn thread_time() -> Duration {
+pub fn thread_time() -> Duration {
     use std::sync::LazyLock;
     use std::time::Instant;
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
@@ -19,7 +19,7 @@ pub(crate) fn thread_time() -> Duration {
 }
 
 /// Resident memory of this process in bytes, on Linux; 0 elsewhere.
-pub(crate) fn resident_bytes() -> u64 {
+pub fn resident_bytes() -> u64 {
     let read = || {
         let pages = std::fs::read_to_string("/proc/self/statm").ok()?;
         pages.split(' ').nth(1)?.parse::<u64>().ok()

@@ -4,6 +4,8 @@ use core::ops;
 
 use marchless::Region;
 
+use super::rows::Rows;
+
 /// Chunks: a box, or those that an ellipsoid reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
@@ -90,9 +92,15 @@ impl Grown {
         self.range.extent.contains(position) && self.row(y, z).contains(&x)
     }
 
+    /// A box around the chunks.
+    fn bounds(&self) -> Region {
+        let reach = [0, 1, 2].map(|axis| self.reach(axis, self.range.radii[axis]));
+        Region::new(reach.each_ref().map(|reach| reach.start), reach.each_ref().map(|reach| reach.end))
+    }
+
     /// How many chunks there are.
     pub(crate) fn len(&self) -> u64 {
-        self.table().rows().map(|(.., row)| row.len() as u64).sum()
+        self.rows().iter().map(|(.., row)| row.len() as u64).sum()
     }
 
     /// Which chunks of a row belong to it.
@@ -120,11 +128,16 @@ impl Grown {
         beyond * beyond
     }
 
-    /// Prepares for looking at all rows.
-    fn table(&self) -> Table {
+    /// All its chunks, row by row.
+    pub(super) fn rows(&self) -> Rows {
         let reach = |axis: usize| self.reach(axis, self.range.radii[axis]);
-        let squares = |axis: usize| reach(axis).map(|position| self.square(axis, position)).collect();
-        Table { grown: *self, from: [reach(1).start, reach(2).start], y: squares(1), z: squares(2) }
+        let squares = |axis: usize| reach(axis).map(|position| self.square(axis, position)).collect::<Vec<_>>();
+        let (from, y_squares, z_squares) = ([reach(1).start, reach(2).start], squares(1), squares(2));
+        let mut spans = Vec::with_capacity(y_squares.len() * z_squares.len());
+        for &z in &z_squares {
+            spans.extend(y_squares.iter().map(|&y| self.row_at(y, z)).map(|row| [row.start, row.end]));
+        }
+        Rows::new(from, y_squares.len(), spans)
     }
 
     /// The positions along an axis of chunks that come as near as `radius` to the middle.
@@ -137,51 +150,15 @@ impl Grown {
     }
 }
 
-/// A [`Grown`] with what all its rows have in common.
-struct Table {
-    grown: Grown,
-    /// The first y and z.
-    from: [i32; 2],
-    /// The squares of each, from there on.
-    y: Vec<f64>,
-    z: Vec<f64>,
-}
-
-impl Table {
-    /// All chunks, row by row: y, z, and which x; some rows are empty.
-    fn rows(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
-        let [first_y, first_z] = self.from;
-        // Counted from 0: the last row may be the last that there is a number for.
-        (0..).zip(&self.z).flat_map(move |(z, &z_square)| {
-            let row = move |(y, &y_square)| (first_y + y, first_z + z, self.grown.row_at(y_square, z_square));
-            (0..).zip(&self.y).map(row)
-        })
-    }
-
-    /// Which chunks of a row belong to it.
-    fn row(&self, y: i32, z: i32) -> ops::Range<i32> {
-        let square =
-            |squares: &[f64], from: i32, at: i32| squares.get(usize::try_from(at.checked_sub(from)?).ok()?).copied();
-        match (square(&self.y, self.from[0], y), square(&self.z, self.from[1], z)) {
-            (Some(y), Some(z)) => self.grown.row_at(y, z),
-            _ => 0..0,
-        }
-    }
-}
-
 /// The greatest integer that is not greater, saturating. Without SSE4.1 [`f64::floor`] is a call, and ranges have many rows.
 fn floor(value: f64) -> i32 {
     let towards_zero = value as i32;
     towards_zero.saturating_sub((f64::from(towards_zero) > value).into())
 }
 
-/// The ranges of a terrain, as the viewers' and what is kept ask for them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Ranges(pub(crate) Vec<Viewed>);
-
-/// One range, in the steps that decide what becomes of a chunk.
+/// What one viewer sees, and what of it stays.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Viewed {
+pub(crate) struct View {
     pub(crate) range: Range,
     /// How many chunks farther away chunks stay.
     pub(crate) margin: f64,
@@ -189,35 +166,42 @@ pub(crate) struct Viewed {
     pub(crate) samples: Option<Range>,
     /// Where it looks, in the terrain's space; zero where that is not known.
     pub(crate) forward: [f64; 3],
+    /// A box around all that it asks for.
+    bounds: Region,
 }
 
-/// What ranges ask of a chunk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Wanted {
-    /// Nothing.
-    Gone,
-    /// Its samples, for the sake of its neighbours.
-    Samples,
-    /// Its mesh.
-    Mesh,
-}
-
-impl Viewed {
-    /// The ranges into which chunks come: those that are drawn, and those with samples for them; where samples are wanted again.
-    fn entries(&self) -> [Option<Grown>; 3] {
-        [Some(self.range.grown(0.0)), Some(self.range.grown(1.0)), self.samples.map(|samples| samples.grown(0.0))]
+impl View {
+    pub(crate) fn new(range: Range, margin: f64, samples: Option<Range>, forward: [f64; 3]) -> Self {
+        let all = [Some(range.widened(margin).grown(1.0)), samples.map(|samples| samples.widened(margin).grown(0.0))];
+        let bounds = all.into_iter().flatten().map(|grown| grown.bounds());
+        let bounds = bounds.reduce(|a, b| a.union(&b)).unwrap_or(Region::new([0; 3], [0; 3]));
+        Self { range, margin, samples, forward, bounds }
     }
 
-    /// The same, out of which they go.
-    fn exits(&self) -> [Option<Grown>; 3] {
-        let stays = self.range.widened(self.margin);
-        let samples = self.samples.map(|samples| samples.widened(self.margin).grown(0.0));
-        [Some(stays.grown(0.0)), Some(stays.grown(1.0)), samples]
+    /// The same view, looking elsewhere.
+    #[must_use]
+    pub(crate) const fn facing(self, forward: [f64; 3]) -> Self {
+        Self { forward, ..self }
     }
 
-    /// The square of how far chunks are from the viewer, in chunks, and farther where they are behind it. Where the
-    /// ellipsoid's axes are not equal, distances are scaled to the longest.
-    fn urgency(&self) -> impl Fn([i32; 3]) -> f64 + use<> {
+    /// A box around all that it asks for.
+    pub(crate) const fn bounds(&self) -> Region {
+        self.bounds
+    }
+
+    /// Where chunks stay that are drawn.
+    pub(crate) fn with_margin(&self) -> Range {
+        self.range.widened(self.margin)
+    }
+
+    /// How urgent a chunk is: the lower, the sooner. Near before far, and in front before behind. Where the ellipsoid's
+    /// axes are not equal, distances are scaled to the longest.
+    pub(crate) fn urgency(&self, position: [i32; 3]) -> u32 {
+        self.urgencies()(position)
+    }
+
+    /// [`urgency`](Self::urgency), for many chunks.
+    pub(crate) fn urgencies(&self) -> impl Fn([i32; 3]) -> u32 + use<> {
         let Self { range, forward, .. } = *self;
         let scale = range.radii.map(|radius| range.longest() / radius.max(1e-9));
         move |position| {
@@ -225,115 +209,19 @@ impl Viewed {
             let distance: f64 = (0..3).map(|axis| (offset[axis] * scale[axis]).powi(2)).sum();
             let ahead: f64 = (0..3).map(|axis| offset[axis] * forward[axis]).sum();
             // What is close may be turned to in no time.
-            if ahead < 0.0 && distance > 4.0 { 2.0 * distance } else { distance }
+            (16.0 * if ahead < 0.0 && distance > 4.0 { 2.0 * distance } else { distance }) as u32
         }
     }
 
-    fn has_borders_of(&self, other: &Self) -> bool {
-        Self { forward: other.forward, ..*self } == *other
-    }
-}
-
-impl Ranges {
-    /// Whether a chunk is in range: to be drawn as soon as it can be.
-    pub(crate) fn contains(&self, position: [i32; 3]) -> bool {
-        self.0.iter().any(|viewed| viewed.range.grown(0.0).contains(position))
+    /// Whether other chunks may be urgent for this view than for an old one.
+    pub(crate) fn differs_in_urgency(&self, old: &Self) -> bool {
+        let moved = |axis: usize| (self.range.middle[axis] - old.range.middle[axis]).abs() >= 1.0;
+        self.forward != old.forward || self.range.radii != old.range.radii || (0..3).any(moved)
     }
 
-    /// What is asked of a chunk that is `now` so.
-    pub(crate) fn wanted(&self, position: [i32; 3], now: Wanted) -> Wanted {
-        let grown = |by: f64| self.0.iter().any(|viewed| viewed.range.grown(by).contains(position));
-        let stays =
-            |by: f64| self.0.iter().any(|viewed| viewed.range.widened(viewed.margin).grown(by).contains(position));
-        if grown(0.0) || now == Wanted::Mesh && stays(0.0) {
-            Wanted::Mesh
-        } else if grown(1.0) || now >= Wanted::Samples && stays(1.0) {
-            Wanted::Samples
-        } else {
-            Wanted::Gone
-        }
-    }
-
-    /// Whether samples are to be there, where they have been dropped.
-    pub(crate) fn wants_samples(&self, position: [i32; 3]) -> bool {
-        self.0.iter().any(|viewed| {
-            viewed.samples.map_or_else(
-                || viewed.range.widened(viewed.margin).grown(1.0).contains(position),
-                |range| range.grown(0.0).contains(position),
-            )
-        })
-    }
-
-    /// Whether samples that are there may be dropped.
-    pub(crate) fn may_drop_samples(&self, position: [i32; 3]) -> bool {
-        !self.0.iter().any(|viewed| {
-            let Some(range) = viewed.samples else {
-                return viewed.range.widened(viewed.margin).grown(1.0).contains(position);
-            };
-            range.widened(viewed.margin).grown(0.0).contains(position)
-        })
-    }
-
-    /// What comes first: the lower, the sooner. Near before far, and in front before behind.
-    pub(crate) fn urgency(&self, position: [i32; 3]) -> u32 {
-        as_number(self.0.iter().map(|viewed| viewed.urgency()(position)))
-    }
-
-    /// [`urgency`](Self::urgency), for many chunks.
-    pub(crate) fn urgencies(&self) -> impl Fn([i32; 3]) -> u32 {
-        let of_viewers: Vec<_> = self.0.iter().map(Viewed::urgency).collect();
-        move |position| as_number(of_viewers.iter().map(|of| of(position)))
-    }
-
-    /// Whether other chunks may be urgent for these ranges than for `old` ones.
-    pub(crate) fn differ_in_urgency(&self, old: &Self) -> bool {
-        let far = |(new, old): (&Viewed, &Viewed)| {
-            let [new_middle, old_middle] = [new, old].map(|viewed| viewed.range.middle);
-            new.forward != old.forward || (0..3).any(|axis| (new_middle[axis] - old_middle[axis]).abs() >= 1.0)
-        };
-        self.0.len() != old.0.len() || self.0.iter().zip(&old.0).any(far)
-    }
-
-    /// The chunks that come into these ranges from `old` ones, and those that go out of the old ones.
-    pub(crate) fn differences(&self, old: &Self, mut come: impl FnMut([i32; 3]), mut go: impl FnMut([i32; 3])) {
-        for index in 0..self.0.len().max(old.0.len()) {
-            let (new, old) = (self.0.get(index), old.0.get(index));
-            if new.zip(old).is_some_and(|(new, old)| new.has_borders_of(old)) {
-                continue;
-            }
-            let borders =
-                |viewed: Option<&Viewed>, of: fn(&Viewed) -> [Option<Grown>; 3]| viewed.map(of).unwrap_or_default();
-            difference(borders(new, Viewed::entries), borders(old, Viewed::entries), &mut come);
-            difference(borders(old, Viewed::exits), borders(new, Viewed::exits), &mut go);
-        }
-    }
-}
-
-/// The least of all viewers' urgencies, as a number that can be sorted by.
-fn as_number(urgencies: impl Iterator<Item = f64>) -> u32 {
-    (16.0 * urgencies.fold(f64::INFINITY, f64::min)) as u32
-}
-
-/// What is in ranges and not in others, border by border. The second border is around the first.
-fn difference(these: [Option<Grown>; 3], others: [Option<Grown>; 3], take: &mut impl FnMut([i32; 3])) {
-    let others = others.map(|other| other.map(|other| other.table()));
-    let row_of = |border: usize, y: i32, z: i32| others[border].as_ref().map_or(0..0, |other| other.row(y, z));
-    for (border, range) in these.into_iter().enumerate() {
-        let Some(range) = range.map(|range| range.table()) else { continue };
-        for (y, z, mut row) in range.rows() {
-            let other = row_of(border, y, z);
-            if row == other {
-                continue;
-            }
-            let other = if other.is_empty() { row.start..row.start } else { other };
-            // Of the first, what lies beyond the other's second is in the second's difference, too.
-            if border == 0 {
-                let around = row_of(1, y, z);
-                row = row.start.max(around.start)..row.end.min(around.end);
-            }
-            (row.start..row.end.min(other.start)).for_each(|x| take([x, y, z]));
-            (row.start.max(other.end)..row.end).for_each(|x| take([x, y, z]));
-        }
+    /// Whether all that it asks for is what another one asks for.
+    pub(super) fn has_borders_of(&self, other: &Self) -> bool {
+        other.facing(self.forward) == *self
     }
 }
 
@@ -368,7 +256,7 @@ mod tests {
         fn rows_hold_what_the_range_contains(range in range(), by in 0..2i32) {
             let grown = range.grown(by.into());
             let rows: BTreeSet<_> =
-                grown.table().rows().flat_map(|(y, z, row)| row.map(move |x| [x, y, z])).collect();
+                grown.rows().iter().flat_map(|(y, z, row)| row.map(move |x| [x, y, z])).collect();
             prop_assert_eq!(grown.len(), rows.len() as u64);
             prop_assert_eq!(rows, set(&grown));
         }
@@ -406,23 +294,6 @@ mod tests {
             let chunks = Region::new(min, [0, 1, 2].map(|i| min[i] + size[i]));
             let expected: BTreeSet<_> = chunks.intersection(&EXTENT).points().collect();
             prop_assert_eq!(set(&Range::of_box(chunks, EXTENT).grown(0.0)), expected);
-        }
-
-        #[test]
-        fn differences_hold_every_chunk_whose_lot_changes(a in range(), b in range(), margin in 0.0..2.0f64) {
-            let viewed = |range| Viewed { range, margin, samples: None, forward: [0.0; 3] };
-            let (new, old) = (Ranges(vec![viewed(a)]), Ranges(vec![viewed(b)]));
-            let (mut come, mut gone) = (BTreeSet::new(), BTreeSet::new());
-            new.differences(&old, |position| { come.insert(position); }, |position| { gone.insert(position); });
-            for position in all() {
-                for now in [Wanted::Gone, Wanted::Samples, Wanted::Mesh] {
-                    let wanted = new.wanted(position, now);
-                    if old.wanted(position, now) == now && wanted != now {
-                        let found = if wanted > now { &come } else { &gone };
-                        prop_assert!(found.contains(&position), "{:?} as {:?}", position, now);
-                    }
-                }
-            }
         }
     }
 }

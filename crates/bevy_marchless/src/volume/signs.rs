@@ -4,21 +4,28 @@ use marchless::{Chunk, Weight as _};
 
 /// Of a chunk's samples, those of its lowest layer along each axis, and all of them: on which side of the surface they
 /// lie. `true`: inside; `None`: some here and some there, or not known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Signs {
     lowest: [Option<bool>; 3],
     all: Option<bool>,
+    /// What they are the signs of.
+    isovalue: f32,
 }
 
 impl Signs {
-    pub(crate) const UNKNOWN: Self = Self { lowest: [None; 3], all: None };
+    pub(crate) const UNKNOWN: Self = Self { lowest: [None; 3], all: None, isovalue: 0.0 };
+
+    /// The signs, if they are those of this isovalue.
+    pub(crate) fn at(self, isovalue: f32) -> Self {
+        if self.isovalue == isovalue { self } else { Self::UNKNOWN }
+    }
 
     /// The signs of these samples.
     pub(crate) fn of(chunk: &Chunk<i16>, isovalue: f32) -> Self {
         match chunk {
             Chunk::Uniform(voxel) => {
                 let inside = Some(voxel.weight.to_voxels() < isovalue);
-                Self { lowest: [inside; 3], all: inside }
+                Self { lowest: [inside; 3], all: inside, isovalue }
             }
             Chunk::Samples(samples) => {
                 let weights = &samples.weights[..];
@@ -38,6 +45,7 @@ impl Signs {
                         side(&mut weights[..layer].iter()),
                     ],
                     all: side(&mut weights.iter()),
+                    isovalue,
                 }
             }
         }
@@ -111,11 +119,11 @@ mod tests {
             Chunk::from_samples(weights, vec![0; n * n * n], n as u32).unwrap()
         };
         let y_lowest = Signs::of(&weights(&|_, y, _| if y == 0 { -5 } else { 5 }), 0.0);
-        assert_eq!(y_lowest, Signs { lowest: [None, Some(true), None], all: None });
+        assert_eq!(y_lowest, Signs { lowest: [None, Some(true), None], all: None, isovalue: 0.0 });
         let one = Signs::of(&weights(&|x, y, z| if [x, y, z] == [3, 2, 0] { -5 } else { 5 }), 0.0);
-        assert_eq!(one, Signs { lowest: [Some(false), Some(false), None], all: None });
+        assert_eq!(one, Signs { lowest: [Some(false), Some(false), None], all: None, isovalue: 0.0 });
         let none = Signs::of(&weights(&|x, _, _| 5 + x as i16), 0.0);
-        assert_eq!(none, Signs { lowest: [Some(false); 3], all: Some(false) });
+        assert_eq!(none, Signs { lowest: [Some(false); 3], all: Some(false), isovalue: 0.0 });
         assert_eq!(Signs::of(&Chunk::AIR, 0.0), none);
     }
 }

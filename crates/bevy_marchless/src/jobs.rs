@@ -13,13 +13,13 @@ use bevy_ecs::prelude::*;
 use bevy_platform::sync::atomic::AtomicU64;
 use bevy_tasks::{AsyncComputeTaskPool, futures_lite::future::yield_now};
 
-use crate::schedule::MarchlessSettings;
-
 /// What comes first, and within one kind, the lowest number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Priority {
     /// Meshing what has changed.
     Edit,
+    /// Meshing what new settings change.
+    Restyle,
     /// Meshing a chunk for the first time.
     FirstMesh(u32),
     /// Sampling a chunk.
@@ -66,7 +66,7 @@ impl Drop for Ticket {
 }
 
 impl WorkQueue {
-    /// Adds a job, which starts at the next [`start_work`] at the earliest.
+    /// Adds a job, which starts at the next [`start`](Self::start) at the earliest.
     pub(crate) fn push(&self, priority: Priority, run: impl FnOnce() + Send + 'static) -> Ticket {
         let claimed = Arc::new(AtomicBool::new(false));
         let mut state = self.0.lock();
@@ -74,6 +74,27 @@ impl WorkQueue {
         state.pushed += 1;
         state.jobs.push(Job { order, claimed: claimed.clone(), run: Box::new(run) });
         Ticket(claimed)
+    }
+
+    /// Starts tasks for the jobs that wait or, without threads, does this many at once, 8 if that is not said.
+    pub(crate) fn start(&self, budget: Option<usize>) {
+        match (budget, AsyncComputeTaskPool::try_get()) {
+            (None, Some(pool)) => {
+                let mut state = self.0.lock();
+                let wanted = state.jobs.len().min(pool.thread_num().max(1));
+                while state.workers < wanted {
+                    state.workers += 1;
+                    pool.spawn(work(self.0.clone())).detach();
+                }
+            }
+            (budget, _) => {
+                for _ in 0..budget.unwrap_or(8) {
+                    if !do_next(self) {
+                        break;
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -127,28 +148,6 @@ async fn work(shared: Arc<Shared>) {
     }
 }
 
-/// Starts tasks for the jobs that wait or, without threads, does a budget of them at once.
-pub(crate) fn start_work(queue: Res<WorkQueue>, settings: Res<MarchlessSettings>) {
-    let pool = AsyncComputeTaskPool::try_get();
-    match (settings.budget, pool) {
-        (None, Some(pool)) => {
-            let mut state = queue.0.lock();
-            let wanted = state.jobs.len().min(pool.thread_num().max(1));
-            while state.workers < wanted {
-                state.workers += 1;
-                pool.spawn(work(queue.0.clone())).detach();
-            }
-        }
-        (budget, _) => {
-            for _ in 0..budget.unwrap_or(8) {
-                if !do_next(&queue) {
-                    break;
-                }
-            }
-        }
-    }
-}
-
 /// Does the most urgent job here and now; `false` where none waits.
 pub(crate) fn do_next(queue: &WorkQueue) -> bool {
     let job = queue.0.take();
@@ -157,19 +156,22 @@ pub(crate) fn do_next(queue: &WorkQueue) -> bool {
     found
 }
 
-/// A number that no other work in this process has, above all before it: whose results are late can be told from it,
-/// whatever has become of the component that asked for them.
+/// A process-unique, increasing id; tells stale results from new ones.
 pub(crate) fn new_number() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
     LAST.fetch_add(1, Relaxed) + 1
 }
 
-/// Where jobs leave what they made.
+/// Where the jobs of one terrain leave what they made. What nobody takes waits, as long as the terrain is there.
 pub(crate) struct Results<T>(Arc<Mutex<Vec<T>>>);
 
 impl<T> Results<T> {
     pub(crate) fn push(&self, result: T) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(result);
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
     }
 
     /// All results since the last time, in the order in which they were made.

@@ -1,0 +1,319 @@
+//! [`ChunkQueue`]: chunks that wait for something, each once, the most urgent first.
+
+use core::cmp::Reverse;
+use core::ops::Bound;
+use std::collections::{BTreeMap, VecDeque};
+
+use bevy_platform::collections::HashSet;
+
+use super::{Cover, View, ViewId};
+use crate::chunk::ChunkKey;
+
+/// This many chunks of a viewer are sorted at once.
+const SOON: usize = 256;
+/// Stale entries of a viewer are pruned once there are more than this, and twice as many as after the last time.
+const FEW: usize = 1024;
+
+/// Chunks that wait for something, each once. Viewers take turns, and each has its chunks in order of urgency.
+///
+/// Thousands may wait while few of them have their turn, and what is urgent changes with each viewer's steps. So only
+/// those that come soon are sorted, and only for the viewer that has moved.
+#[derive(Debug, Default)]
+pub(crate) struct ChunkQueue {
+    /// Before all others.
+    first: UniqueQueue,
+    /// Those of each viewer; `None` has those that no viewer asks for, too.
+    agendas: BTreeMap<ViewId, Agenda>,
+    members: HashSet<ChunkKey>,
+    /// Whose turn it was last.
+    last: ViewId,
+}
+
+/// Chunks, each once, in the order in which they came.
+#[derive(Debug, Default)]
+pub(crate) struct UniqueQueue {
+    keys: VecDeque<ChunkKey>,
+    members: HashSet<ChunkKey>,
+}
+
+impl UniqueQueue {
+    pub(crate) fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
+    pub(crate) fn push(&mut self, key: ChunkKey) {
+        if self.members.insert(key) {
+            self.keys.push_back(key);
+        }
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<ChunkKey> {
+        let key = self.keys.pop_front()?;
+        self.members.remove(&key);
+        Some(key)
+    }
+}
+
+impl ChunkQueue {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.members.is_empty() && self.first.is_empty()
+    }
+
+    /// How many chunks wait; one that has been put first may count twice.
+    pub(crate) fn len(&self) -> usize {
+        self.members.len() + self.first.len()
+    }
+
+    /// All chunks, in no order; one that has been put first may come twice.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = ChunkKey> + '_ {
+        self.first.keys.iter().chain(&self.members).copied()
+    }
+
+    pub(crate) fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Adds a chunk, which comes when it is its turn for the viewer to which it matters most.
+    pub(crate) fn add(&mut self, key: ChunkKey, cover: &Cover) {
+        if self.members.insert(key) {
+            let (id, urgency) = cover.most_urgent(key.position).unwrap_or_default();
+            self.agendas.entry(id).or_default().add(key, urgency);
+        }
+    }
+
+    /// Adds a chunk, which comes before all others.
+    pub(crate) fn add_first(&mut self, key: ChunkKey) {
+        self.first.push(key);
+    }
+
+    /// Adds one of many chunks that a viewer asks for, to be sorted later.
+    pub(crate) fn add_unsorted(&mut self, key: ChunkKey, id: ViewId) {
+        if self.members.insert(key) {
+            self.agendas.entry(id).or_default().later.push(key);
+        }
+    }
+
+    /// Notes that it has become another question what is urgent for a viewer.
+    pub(crate) fn sort_again(&mut self, id: ViewId) {
+        if let Some(agenda) = self.agendas.get_mut(&id) {
+            agenda.sort_again();
+        }
+    }
+
+    /// Hands the chunks of a viewer that is gone to others.
+    pub(crate) fn remove_view(&mut self, id: ViewId, cover: &Cover) {
+        let Some(Agenda { soon, later, .. }) = self.agendas.remove(&id) else { return };
+        for key in soon.into_iter().map(|(_, Reverse(key))| key).chain(later) {
+            self.members.remove(&key);
+            self.add(key, cover);
+        }
+    }
+
+    /// Takes out the next chunk that still `waits`.
+    pub(crate) fn pop(&mut self, cover: &Cover, waits: impl Fn(&ChunkKey) -> bool) -> Option<ChunkKey> {
+        while let Some(key) = self.first.pop() {
+            if waits(&key) {
+                return Some(key);
+            }
+        }
+        if self.members.is_empty() {
+            return None;
+        }
+        let Self { agendas, members, last, .. } = self;
+        let behind = (Bound::Excluded(*last), Bound::Unbounded);
+        let turns: Vec<ViewId> = agendas.range(behind).chain(agendas.range(..=*last)).map(|(id, _)| *id).collect();
+        for id in turns {
+            let Some(agenda) = agendas.get_mut(&id) else { continue };
+            if let Some(key) = agenda.pop(cover.view(id), members, &waits) {
+                *last = id;
+                return Some(key);
+            }
+        }
+        None
+    }
+}
+
+/// The chunks of one viewer.
+#[derive(Debug)]
+struct Agenda {
+    /// The most urgent ones, the first at the end.
+    soon: Vec<(Reverse<u32>, Reverse<ChunkKey>)>,
+    is_sorted: bool,
+    later: Vec<ChunkKey>,
+    /// None that comes later is more urgent. The lower, the sooner.
+    bar: u32,
+    /// When this many come later, stale ones are pruned.
+    prune_at: usize,
+}
+
+impl Default for Agenda {
+    fn default() -> Self {
+        Self { soon: Vec::new(), is_sorted: true, later: Vec::new(), bar: 0, prune_at: FEW }
+    }
+}
+
+impl Agenda {
+    fn add(&mut self, key: ChunkKey, urgency: u32) {
+        if urgency < self.bar {
+            self.soon.push((Reverse(urgency), Reverse(key)));
+            self.is_sorted = false;
+        } else {
+            self.later.push(key);
+        }
+    }
+
+    fn sort_again(&mut self) {
+        self.later.extend(self.soon.drain(..).map(|(_, Reverse(key))| key));
+        self.bar = 0;
+    }
+
+    fn pop(
+        &mut self,
+        view: Option<&View>,
+        members: &mut HashSet<ChunkKey>,
+        waits: impl Fn(&ChunkKey) -> bool,
+    ) -> Option<ChunkKey> {
+        loop {
+            if self.soon.len() > 2 * SOON {
+                self.sort_again();
+            }
+            if self.soon.is_empty() {
+                self.choose(view, members, &waits);
+            }
+            if !self.is_sorted {
+                self.soon.sort_unstable();
+                self.is_sorted = true;
+            }
+            let (_, Reverse(key)) = self.soon.pop()?;
+            members.remove(&key);
+            if waits(&key) {
+                return Some(key);
+            }
+        }
+    }
+
+    /// Chooses who comes soon from all that come later.
+    fn choose(&mut self, view: Option<&View>, members: &mut HashSet<ChunkKey>, waits: impl Fn(&ChunkKey) -> bool) {
+        if self.later.len() >= self.prune_at {
+            self.later.retain(|key| {
+                let is_stale = !waits(key);
+                if is_stale {
+                    members.remove(key);
+                }
+                !is_stale
+            });
+            self.prune_at = 2 * self.later.len() + FEW;
+        }
+        let urgency = view.map(View::urgencies);
+        let urgency = |key: ChunkKey| urgency.as_ref().map_or(0, |urgency| urgency(key.position));
+        self.soon.extend(self.later.drain(..).map(|key| (Reverse(urgency(key)), Reverse(key))));
+        self.is_sorted = false;
+        let most = self.soon.len().saturating_sub(SOON);
+        if most > 0 {
+            let (_, (Reverse(bar), _), _) = self.soon.select_nth_unstable(most);
+            self.bar = *bar;
+            self.later.extend(self.soon.drain(..most).map(|(_, Reverse(key))| key));
+        } else {
+            self.bar = u32::MAX;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use bevy_ecs::entity::Entity;
+    use marchless::Region;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::cover::Range;
+
+    fn view(middle: f64) -> View {
+        let range = Range::ellipsoid([middle, 0.5, 0.5], [40.0; 3], Region::new([-90; 3], [90; 3]));
+        View::new(range, 0.0, None, [1.0, 0.0, 0.0])
+    }
+
+    fn cover(views: &[(ViewId, View)]) -> Cover {
+        let mut cover = Cover::default();
+        for (id, view) in views {
+            cover.set(*id, Some(*view), |_| {}, |_| {});
+        }
+        cover
+    }
+
+    proptest! {
+        #[test]
+        fn all_that_wait_come_once_and_by_urgency(
+            positions in prop::collection::vec(prop::array::uniform3(-9..9i32), 0..3_000),
+            first in prop::array::uniform3(-9..9i32),
+        ) {
+            let cover = cover(&[(None, view(0.5))]);
+            let mut queue = ChunkQueue::default();
+            let waits = |key: &ChunkKey| key.position[0] != 3;
+            for (index, position) in positions.iter().enumerate() {
+                if index % 2 == 0 {
+                    queue.add(ChunkKey::finest(*position), &cover);
+                } else {
+                    queue.add_unsorted(ChunkKey::finest(*position), None);
+                }
+            }
+            let mut expected: BTreeSet<_> =
+                positions.iter().map(|position| (cover.urgency(*position), *position)).collect();
+            prop_assert_eq!(queue.len(), expected.len());
+            expected.retain(|(_, position)| position[0] != 3);
+            queue.add_first(ChunkKey::finest(first));
+            queue.add_first(ChunkKey::finest(first));
+            if waits(&ChunkKey::finest(first)) {
+                prop_assert_eq!(queue.pop(&cover, waits), Some(ChunkKey::finest(first)));
+            }
+            // What is added in between finds its place.
+            if let Some(key) = queue.pop(&cover, waits) {
+                queue.add(key, &cover);
+            }
+            let found: Vec<_> = core::iter::from_fn(|| queue.pop(&cover, waits))
+                .map(|key| (cover.urgency(key.position), key.position))
+                .collect();
+            prop_assert!(found.is_sorted());
+            prop_assert_eq!(found, expected.into_iter().collect::<Vec<_>>());
+            prop_assert!(queue.is_empty());
+        }
+
+        #[test]
+        fn nothing_is_lost_when_viewers_go(
+            positions in prop::collection::vec((prop::array::uniform3(-9..9i32), 0u32..3), 0..600),
+        ) {
+            let ids = [0, 1, 2].map(Entity::from_raw_u32);
+            let mut cover = cover(&[(ids[0], view(0.0)), (ids[1], view(5.0)), (ids[2], view(-3.0))]);
+            let mut queue = ChunkQueue::default();
+            for (position, owner) in &positions {
+                queue.add_unsorted(ChunkKey::finest(*position), ids[*owner as usize]);
+            }
+            cover.set(ids[1], None, |_| {}, |_| {});
+            queue.remove_view(ids[1], &cover);
+            let found: Vec<_> =
+                core::iter::from_fn(|| queue.pop(&cover, |_| true)).map(|key| key.position).collect();
+            let unique: BTreeSet<_> = found.iter().copied().collect();
+            prop_assert_eq!(found.len(), unique.len());
+            prop_assert_eq!(unique, positions.iter().map(|(position, _)| *position).collect());
+        }
+    }
+
+    #[test]
+    fn viewers_take_turns() {
+        let ids = [1, 2].map(Entity::from_raw_u32);
+        let cover = cover(&[(ids[0], view(0.0)), (ids[1], view(60.0))]);
+        let mut queue = ChunkQueue::default();
+        (-4..4).for_each(|x| queue.add(ChunkKey::finest([x, 0, 0]), &cover));
+        (56..64).for_each(|x| queue.add(ChunkKey::finest([x, 0, 0]), &cover));
+        let turns: Vec<bool> =
+            core::iter::from_fn(|| queue.pop(&cover, |_| true)).map(|key| key.position[0] > 30).collect();
+        assert_eq!(turns.len(), 16);
+        assert!(turns.windows(2).all(|pair| pair[0] != pair[1]), "{turns:?}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Asks for the samples of chunks, in jobs, and takes them in.
+
+use bevy_ecs::prelude::*;
+use bevy_platform::time::Instant;
+use bevy_tasks::AsyncComputeTaskPool;
+
+use crate::budget::{FrameBudget, Share};
+use crate::jobs::{Priority, WorkQueue};
+use crate::schedule::MarchlessSettings;
+use crate::stats::TerrainStats;
+use crate::terrain::TerrainVolume;
+use crate::volume::Filled;
+
+/// Each update takes at least this many chunks of a terrain.
+const LEAST: usize = 4;
+
+/// Takes sampled chunks into their volumes, with the stamps that came before them.
+pub(super) fn take_filled_chunks(
+    mut volumes: Query<(Entity, &mut TerrainVolume)>,
+    mut stats: ResMut<TerrainStats>,
+    mut budget: ResMut<FrameBudget>,
+) {
+    let start = Instant::now();
+    let until = budget.until(start, Share::Fill);
+    for (terrain, mut volume) in &mut volumes {
+        if !volume.heart().has_filled() {
+            continue;
+        }
+        volume.heart_mut().take_filled(LEAST, until, |chunk: &Filled| {
+            stats.fill_time += chunk.time;
+            stats.filled += u64::from(chunk.filled);
+            stats.filled_empty += u64::from(chunk.filled && !chunk.may_have_surface());
+            if chunk.panicked {
+                let position = chunk.position;
+                bevy_log::error_once!("a terrain's source panicked; chunk {position:?} of terrain {terrain} stays air");
+            }
+        });
+    }
+    budget.spend(start);
+}
+
+/// Asks for the samples of the chunks that wait for them, the most urgent first, as many as may be in flight.
+pub(super) fn ask_for_samples(
+    mut volumes: Query<&mut TerrainVolume>,
+    queue: Res<WorkQueue>,
+    settings: Res<MarchlessSettings>,
+    mut budget: ResMut<FrameBudget>,
+) {
+    let start = Instant::now();
+    let threads = AsyncComputeTaskPool::try_get().map_or(1, |pool| pool.thread_num().max(1));
+    let limit = settings.in_flight(threads);
+    for mut volume in &mut volumes {
+        if volume.heart().has_to_ask() {
+            let results = volume.heart().filled().clone();
+            volume.heart_mut().ask_for_samples(limit, |job| {
+                let results = results.clone();
+                queue.push(Priority::Fill(job.urgency), move || results.push(job.run()))
+            });
+        }
+    }
+    budget.spend(start);
+}

@@ -1,0 +1,333 @@
+//! [`Heart`]: what a terrain is made of, what is shown of it, and what is to be done about it. It knows no system, no query
+//! and no command: systems tell it what has happened, and carry out what it asks for.
+//!
+//! Its parts own their state, and each is tested alone: [`Samples`] (what is there), [`ChunkTable`] (how far each
+//! loaded chunk is), [`Groups`] (what is meshed together), [`Cover`] (what is wanted). What takes several of them is here,
+//! an event a function: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples arrive),
+//! [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle) (colours, normals
+//! and isovalue change).
+
+mod edit;
+mod fill;
+mod follow;
+mod groups;
+mod memory;
+mod mesh;
+mod restyle;
+mod samples;
+mod signs;
+mod stamps;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use bevy_ecs::entity::Entity;
+use bevy_platform::collections::{HashMap, HashSet};
+use marchless::{Chunk, Edit, Grid, MeshSettings, Region, Source};
+
+pub(crate) use edit::Edits;
+pub(crate) use fill::Filled;
+use groups::Purpose;
+pub(crate) use groups::{Group, Meshed};
+pub(crate) use mesh::{MeshResult, Prepared, Shown, Swap};
+pub(crate) use restyle::{Restyle, Restyled};
+pub(crate) use samples::Samples;
+pub(crate) use signs::Signs;
+pub(crate) use table::{ChunkTable, Drawn, Place};
+
+use crate::chunk::ChunkKey;
+use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, UniqueQueue, ViewId};
+use crate::jobs::{Results, Ticket};
+use groups::Groups;
+use restyle::{Look, Transition};
+
+/// The linear colours of all materials.
+pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
+
+/// What a terrain's samples are before anyone edits them.
+#[derive(Clone)]
+pub(crate) struct Recipe {
+    pub(crate) source: Arc<dyn Source>,
+    /// The chunks that there are.
+    pub(crate) extent: Region,
+    /// Cells of a chunk per axis.
+    pub(crate) cells: u32,
+    /// World units between two samples.
+    pub(crate) spacing: f64,
+}
+
+/// One terrain's state.
+pub(crate) struct Heart {
+    /// `None` before the terrain's settings have been accepted.
+    recipe: Option<Recipe>,
+    samples: Samples,
+    table: ChunkTable,
+    groups: Groups,
+    cover: Cover,
+    /// New viewers, whose chunks are still to be listed.
+    unlisted: VecDeque<ViewId>,
+    /// Chunks of which more may be wanted, and of which less.
+    arriving: ChunkQueue,
+    leaving: UniqueQueue,
+    /// Chunks that wait to be sampled.
+    to_fill: ChunkQueue,
+    /// Chunks with a surface that wait to be meshed for the first time.
+    to_mesh: ChunkQueue,
+    /// Chunks whose samples may be dropped, once nothing else is to be done.
+    droppable: UniqueQueue,
+    /// Chunks that are not loaded, whose samples are wanted because of their many stamps.
+    crowded: UniqueQueue,
+    /// Those of them that are being sampled, each with its job.
+    remote: HashMap<[i32; 3], (u64, Ticket)>,
+    /// How many jobs are sampling, or about to.
+    sampling: usize,
+    /// What the source is certain of, box by box.
+    bounds: HashMap<[i32; 3], Option<Chunk<i16>>>,
+    /// The isovalue as drawn.
+    isovalue: f32,
+    look: Look,
+    /// Chunks that may have to get another look.
+    to_restyle: UniqueQueue,
+    /// The change of the isovalue that is under way, and the one to come after it.
+    transition: Option<Transition>,
+    next_isovalue: Option<f32>,
+    /// Whether a stamp waits for samples that had been dropped.
+    holds_stamps: bool,
+    /// Whether something of the present source has been shown.
+    has_shown: bool,
+    /// What late stamps have changed in this update.
+    late_edits: Vec<Edit>,
+    /// What jobs have made, and what of it waits for an update with more time.
+    filled: Results<Filled>,
+    filled_later: VecDeque<Filled>,
+    meshed: Results<MeshResult>,
+    meshed_later: VecDeque<MeshResult>,
+}
+
+impl Default for Heart {
+    fn default() -> Self {
+        Self {
+            recipe: None,
+            samples: Samples::default(),
+            table: ChunkTable::default(),
+            groups: Groups::default(),
+            cover: Cover::default(),
+            unlisted: VecDeque::new(),
+            arriving: ChunkQueue::default(),
+            leaving: UniqueQueue::default(),
+            to_fill: ChunkQueue::default(),
+            to_mesh: ChunkQueue::default(),
+            droppable: UniqueQueue::default(),
+            crowded: UniqueQueue::default(),
+            remote: HashMap::default(),
+            sampling: 0,
+            bounds: HashMap::default(),
+            isovalue: 0.0,
+            look: Look::default(),
+            to_restyle: UniqueQueue::default(),
+            transition: None,
+            next_isovalue: None,
+            holds_stamps: false,
+            has_shown: false,
+            late_edits: Vec::new(),
+            filled: Results::default(),
+            filled_later: VecDeque::new(),
+            meshed: Results::default(),
+            meshed_later: VecDeque::new(),
+        }
+    }
+}
+
+impl Heart {
+    /// A terrain of which nothing is loaded yet. `meshing`: whether somebody makes meshes.
+    pub(crate) fn new(recipe: Recipe, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
+        let mut heart = Self {
+            samples: Samples::of(recipe.empty_grid()),
+            recipe: Some(recipe),
+            isovalue,
+            look: Look::new(normals, colors),
+            ..Self::default()
+        };
+        heart.table.set_meshing(meshing);
+        heart
+    }
+
+    /// Has all samples come from another source: what was edited is gone, and what is drawn stays until each chunk's new
+    /// mesh is there. The chunks are where they were.
+    pub(crate) fn refill(&mut self, recipe: Recipe, isovalue: f32) {
+        self.samples.refill(recipe.empty_grid());
+        self.table.refill(recipe.extent);
+        self.groups.take_all();
+        self.to_fill.clear();
+        self.to_mesh.clear();
+        self.remote.clear();
+        self.crowded = UniqueQueue::default();
+        self.bounds.clear();
+        self.filled_later.clear();
+        self.meshed_later.clear();
+        (self.sampling, self.has_shown, self.isovalue) = (0, false, isovalue);
+        (self.transition, self.next_isovalue) = (None, None);
+        self.recipe = Some(recipe);
+        let Self { table, arriving, cover, .. } = self;
+        table.keys().for_each(|key| arriving.add(key, cover));
+    }
+
+    /// Whether all chunks that were there when the present source began have been shown with it, so that the next may begin.
+    pub(crate) fn is_generation_shown(&self) -> bool {
+        self.table.counts().outdated == 0 && (self.has_shown || self.is_settled())
+    }
+
+    pub(crate) const fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    pub(crate) const fn table(&self) -> &ChunkTable {
+        &self.table
+    }
+
+    /// Takes the entities that nothing is shown on any more.
+    pub(crate) fn take_released(&mut self) -> Vec<Entity> {
+        self.table.take_released()
+    }
+
+    /// The isovalue as drawn, in voxels.
+    pub(crate) const fn isovalue(&self) -> f32 {
+        self.isovalue
+    }
+
+    /// Where the jobs that sample leave what they made.
+    pub(crate) const fn filled(&self) -> &Results<Filled> {
+        &self.filled
+    }
+
+    /// Where the jobs that mesh leave what they made.
+    pub(crate) const fn meshed(&self) -> &Results<MeshResult> {
+        &self.meshed
+    }
+
+    /// How the meshes that are started now are made.
+    pub(crate) fn mesh_settings(&self) -> MeshSettings {
+        MeshSettings { isovalue: self.isovalue, normals: self.look.normals, ..MeshSettings::default() }
+    }
+
+    /// The colours of the meshes that are started now.
+    pub(crate) const fn colors(&self) -> &Colors {
+        &self.look.colors
+    }
+
+    /// Notes whether a stamp waits for samples.
+    pub(crate) const fn set_holds_stamps(&mut self, holds: bool) {
+        self.holds_stamps = holds;
+    }
+
+    /// What is shown of the chunk at a place; `None` where it is in no range.
+    pub(crate) fn leaf_at(&self, position: [i32; 3]) -> Option<Leaf> {
+        let is_coming = || self.cover.contains(position).then_some(LeafState::Waiting);
+        let state = self.table.leaf_state(ChunkKey::finest(position)).or_else(is_coming)?;
+        Some(Leaf { level: 0, position: position.into(), state })
+    }
+
+    /// How many leaves of each state there are.
+    pub(crate) fn coverage(&self) -> Coverage {
+        let counts = self.table.counts();
+        let is_coming = |key: &ChunkKey| !self.table.is_leaf(*key) && self.cover.contains(key.position);
+        let mut coming: HashSet<ChunkKey> = self.arriving.iter().filter(is_coming).collect();
+        for id in &self.unlisted {
+            let listed = |position| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming));
+            self.cover.list(*id, listed);
+        }
+        Coverage { waiting: counts.waiting + coming.len(), empty: counts.empty, drawn: counts.drawn }
+    }
+
+    /// Whether all chunks in range have their samples.
+    pub(crate) fn is_filled(&self) -> bool {
+        let is_listed = self.unlisted.is_empty() && self.arriving.is_empty();
+        let is_idle = is_listed && self.leaving.is_empty() && self.remote.is_empty();
+        self.recipe.is_some()
+            && self.table.counts().unfilled == 0
+            && is_idle
+            && self.crowded.is_empty()
+            && !self.holds_stamps
+    }
+
+    /// Whether all chunks in range have their samples and everything is drawn as it is.
+    pub(crate) fn is_settled(&self) -> bool {
+        let nothing_waits = !self.table.makes_meshes() || self.table.counts().waiting == 0;
+        self.is_idle() && nothing_waits && self.to_restyle.is_empty() && self.transition.is_none()
+    }
+
+    /// Whether nothing is left to load, to fill or to mesh.
+    fn is_idle(&self) -> bool {
+        let nothing_to_mesh = self.table.ready_len() == 0 && self.to_mesh.is_empty() && self.groups.is_empty();
+        self.is_filled() && nothing_to_mesh
+    }
+
+    /// How many chunks wait for their samples.
+    pub(crate) fn waiting_for_samples(&self) -> usize {
+        self.table.counts().unfilled
+    }
+
+    /// How many chunks can be meshed, or are being meshed.
+    pub(crate) fn waiting_for_meshes(&self) -> usize {
+        let in_transition = self.transition.as_ref().map_or(0, Transition::waiting);
+        self.table.ready_len() + self.to_mesh.len() + self.groups.len() + self.to_restyle.len() + in_transition
+    }
+
+    /// How many chunks in range, or beside it, nobody has looked at yet.
+    pub(crate) fn waiting_to_come(&self) -> usize {
+        self.arriving.len()
+    }
+
+    /// Changes what a viewer sees; `None`: it is gone.
+    pub(crate) fn set_view(&mut self, id: ViewId, view: Option<crate::cover::View>) {
+        let Self { cover, arriving, leaving, to_fill, to_mesh, unlisted, .. } = self;
+        let old = cover.view(id).copied();
+        if old == view {
+            return;
+        }
+        match (old, view) {
+            (None, Some(_)) => unlisted.push_back(id),
+            (Some(_), None) => unlisted.retain(|other| *other != id),
+            _ => {}
+        }
+        // All chunks of a new viewer take time to list: one viewer after the other.
+        let is_listed = !unlisted.contains(&id);
+        cover.set(
+            id,
+            view,
+            |position| {
+                if is_listed {
+                    arriving.add_unsorted(ChunkKey::finest(position), id);
+                }
+            },
+            |position| leaving.push(ChunkKey::finest(position)),
+        );
+        for queue in [arriving, to_fill, to_mesh] {
+            match (old, view) {
+                (Some(old), Some(view)) if view.differs_in_urgency(&old) => queue.sort_again(id),
+                (_, None) => queue.remove_view(id, cover),
+                _ => {}
+            }
+        }
+    }
+}
+
+impl Recipe {
+    /// A grid for its chunks; the settings have been checked.
+    pub(crate) fn empty_grid(&self) -> Grid<i16> {
+        Grid::bounded(self.cells, self.extent).expect("the settings have been checked")
+    }
+
+    /// Whether its chunks are where those of another one are.
+    pub(crate) fn has_places_of(&self, other: &Self) -> bool {
+        self.extent == other.extent && self.cells == other.cells
+    }
+
+    /// Whether its samples are those of another one.
+    pub(crate) fn has_samples_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.source, &other.source) && self.has_places_of(other) && self.spacing == other.spacing
+    }
+}

@@ -1,0 +1,195 @@
+//! Stamps change samples, and what they change together becomes one set of chunks to be meshed.
+
+use core::mem;
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy_platform::collections::HashMap;
+use marchless::{Chunk, Edit, Region, Stamp};
+
+use super::Heart;
+use super::groups::Pending;
+use crate::chunk::ChunkKey;
+use crate::stats::Since;
+
+/// What the stamps of one update have changed of a terrain. Those whose chunks overlap belong together; others stay apart,
+/// so that each is shown and reported by itself.
+#[derive(Default)]
+pub(crate) struct Edits {
+    regions: Vec<Option<EditedRegion>>,
+    /// Which region a chunk with changed samples, or beside such a chunk, belongs to.
+    owners: HashMap<[i32; 3], usize>,
+    /// The chunks with changed samples, as they were.
+    before: BTreeMap<[i32; 3], Chunk<i16>>,
+}
+
+/// What some stamps have changed together.
+struct EditedRegion {
+    edit: Edit,
+    /// Chunks with changed samples.
+    chunks: Vec<[i32; 3]>,
+    /// Chunks whose meshes read changed samples.
+    affected: BTreeSet<[i32; 3]>,
+    since: Since,
+}
+
+impl Edits {
+    /// Adds what one stamp has changed.
+    fn add(&mut self, mut new: EditedRegion) {
+        let mut overlapping: Vec<usize> =
+            new.affected.iter().filter_map(|chunk| self.owners.get(chunk)).copied().collect();
+        overlapping.sort_unstable();
+        overlapping.dedup();
+        // The largest takes the others in; what the stamp itself changed comes last.
+        let size = |index: &usize| self.regions[*index].as_ref().map_or(0, |region| region.affected.len());
+        let home = overlapping.iter().copied().max_by_key(size);
+        let mut all = home.and_then(|home| self.regions[home].take());
+        let others = overlapping.into_iter().filter_map(|index| self.regions[index].take()).collect::<Vec<_>>();
+        let index = home.unwrap_or(self.regions.len());
+        for other in others {
+            self.owners.extend(other.affected.iter().map(|chunk| (*chunk, index)));
+            match &mut all {
+                Some(all) => all.merge(other),
+                None => all = Some(other),
+            }
+        }
+        self.owners.extend(new.affected.iter().map(|chunk| (*chunk, index)));
+        if let Some(mut all) = all {
+            all.merge(new);
+            new = all;
+        }
+        match self.regions.get_mut(index) {
+            Some(place) => *place = Some(new),
+            None => self.regions.push(Some(new)),
+        }
+    }
+}
+
+impl EditedRegion {
+    fn merge(&mut self, other: Self) {
+        self.edit.merge(&other.edit);
+        self.chunks.extend(other.chunks);
+        self.affected.extend(other.affected);
+        self.since = Since::earlier(Some(self.since), Some(other.since)).unwrap_or(self.since);
+    }
+}
+
+impl Heart {
+    /// Applies a stamp that was read at `since`.
+    pub(crate) fn stamp(&mut self, stamp: Stamp, since: Since, edits: &mut Edits) {
+        let changed = self.samples.stamp(stamp, &mut edits.before);
+        changed.crowded.into_iter().for_each(|position| self.crowded.push(ChunkKey::finest(position)));
+        for position in &changed.chunks {
+            self.table.samples_changed(ChunkKey::finest(*position));
+        }
+        if !changed.edit.is_empty() {
+            let super::samples::Changed { edit, chunks, affected, .. } = changed;
+            edits.add(EditedRegion { edit, chunks, affected, since });
+        }
+    }
+
+    /// Notes which chunks an update's stamps have changed, and which of them are to be meshed. Returns what each region's
+    /// stamps have changed.
+    pub(crate) fn finish_edits(&mut self, edits: Edits) -> Vec<Edit> {
+        let Edits { regions, before, .. } = edits;
+        let settings = self.mesh_settings();
+        let mut reports = Vec::new();
+        for EditedRegion { edit, chunks, affected, since } in regions.into_iter().flatten() {
+            let before: BTreeMap<_, _> =
+                chunks.iter().filter_map(|chunk| Some((*chunk, before.get(chunk)?.clone()))).collect();
+            let redrawn = self.samples.newest().chunks_redrawn(&before, edit.region, &settings);
+            let look_the_same =
+                redrawn.map(|redrawn| affected.difference(&redrawn).copied().map(ChunkKey::finest).collect());
+            self.changed(Pending {
+                chunks: affected.into_iter().map(ChunkKey::finest).collect(),
+                look_the_same: look_the_same.unwrap_or_default(),
+                since: Some(since),
+            });
+            reports.push(edit);
+        }
+        reports
+    }
+
+    /// Whether stamps have changed chunks that have just got their samples.
+    pub(crate) const fn has_late_edits(&self) -> bool {
+        !self.late_edits.is_empty()
+    }
+
+    /// What stamps have changed in this update of chunks that have just got their samples. What touches is one.
+    pub(crate) fn take_late_edits(&mut self) -> Vec<Edit> {
+        let mut merged: Vec<Edit> = Vec::new();
+        for edit in mem::take(&mut self.late_edits) {
+            let reach = edit.region.grown(1, 1);
+            match merged.iter_mut().find(|other| !other.region.intersection(&reach).is_empty()) {
+                Some(other) => other.merge(&edit),
+                None => merged.push(edit),
+            }
+        }
+        merged
+    }
+
+    /// Whether all samples are there that a change of these lattice points needs, or may come as they are filled. Those
+    /// that have been dropped are asked for.
+    pub(crate) fn has_samples_for(&mut self, changed: Region) -> bool {
+        if !self.cover.drops_samples() || changed.is_empty() {
+            return true;
+        }
+        let affected = self.samples.newest().chunks_affected_by(changed).grown(1, 1);
+        // What is being filled again still has its neighbours on the screen.
+        let is_lost = |key: &ChunkKey| self.table.is_shown(*key) && !self.table.is_filled(*key);
+        let all = affected.size().into_iter().map(u64::from).product::<u64>();
+        let lost: Vec<ChunkKey> = if all < self.table.len() as u64 {
+            affected.points().map(ChunkKey::finest).filter(is_lost).collect()
+        } else {
+            self.table.keys().filter(|key| affected.contains(key.position) && is_lost(key)).collect()
+        };
+        lost.iter().for_each(|key| self.revive(*key));
+        lost.is_empty()
+    }
+
+    /// Chunks have changed together.
+    pub(super) fn changed(&mut self, pending: Pending) {
+        if !self.table.makes_meshes() {
+            return;
+        }
+        for key in &pending.chunks {
+            self.renew_in_transition(*key);
+        }
+        self.groups.add(pending);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::TerrainStats;
+
+    fn region(chunks: core::ops::Range<i32>, volume: u64) -> EditedRegion {
+        let affected: BTreeSet<_> = chunks.clone().map(|x| [x, 0, 0]).collect();
+        let mut edit = Edit { region: Region::new([chunks.start, 0, 0], [chunks.end, 1, 1]), ..Edit::NONE };
+        edit.removed.add(0, volume);
+        EditedRegion { edit, chunks: vec![[chunks.start, 0, 0]], affected, since: TerrainStats::default().now() }
+    }
+
+    #[test]
+    fn regions_that_overlap_become_one() {
+        let mut edits = Edits::default();
+        edits.add(region(0..3, 1));
+        edits.add(region(10..13, 2));
+        edits.add(region(20..23, 4));
+        edits.add(region(2..11, 8));
+        edits.add(region(30..31, 16));
+        edits.add(region(22..24, 32));
+        let mut found: Vec<_> = edits
+            .regions
+            .iter()
+            .flatten()
+            .map(|region| (region.affected.len(), region.chunks.len(), region.edit.removed.total()))
+            .collect();
+        found.sort_unstable();
+        assert_eq!(found, [(1, 1, 16), (4, 2, 36), (13, 3, 11)]);
+        edits.add(region(12..31, 64));
+        assert_eq!(edits.regions.iter().flatten().count(), 1);
+        assert_eq!(edits.owners.len(), 31);
+        assert!(edits.owners.values().all(|owner| edits.regions[*owner].is_some()));
+    }
+}

@@ -1,0 +1,238 @@
+//! Samples are asked for, and arrive.
+
+use core::time::Duration;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use bevy_platform::time::Instant;
+use marchless::{BOUND_BOX_CHUNKS, Chunk, Source};
+
+use super::groups::Pending;
+use super::samples::{Replay, Replayed};
+use super::{Heart, Recipe, Signs};
+use crate::chunk::ChunkKey;
+use crate::jobs::{Ticket, new_number};
+use crate::stats::TerrainStats;
+
+/// Bounds of this many boxes are remembered.
+const MOST_BOXES: usize = 4096;
+
+/// Sampling one chunk.
+pub(crate) struct FillJob {
+    job: u64,
+    generation: u64,
+    position: [i32; 3],
+    source: Arc<dyn Source>,
+    cells: u32,
+    spacing: f64,
+    isovalue: f32,
+    replay: Replay,
+    /// The lower, the sooner.
+    pub(crate) urgency: u32,
+}
+
+/// A chunk that has been sampled.
+pub(crate) struct Filled {
+    job: u64,
+    generation: u64,
+    pub(crate) position: [i32; 3],
+    chunk: Chunk<i16>,
+    signs: Signs,
+    replayed: Replayed,
+    /// Whether the source filled it, instead of being certain of it.
+    pub(crate) filled: bool,
+    /// Whether the source panicked.
+    pub(crate) panicked: bool,
+    pub(crate) time: Duration,
+}
+
+impl Filled {
+    /// Whether some samples lie inside and some outside, for all that is known.
+    pub(crate) const fn may_have_surface(&self) -> bool {
+        self.signs.may_have_surface()
+    }
+}
+
+impl FillJob {
+    /// Samples the chunk, on any thread. A source that panics gives air.
+    pub(crate) fn run(self) -> Filled {
+        let start = Instant::now();
+        let Self { job, generation, position, source, cells, spacing, isovalue, replay, .. } = self;
+        let (of_box, sample) = (bound_box(source.as_ref(), position, cells, spacing), || {
+            Chunk::from_uncertain_source(source.as_ref(), position, cells, spacing)
+        });
+        let sampled = match bound_chunk(source.as_ref(), of_box, position, cells, spacing) {
+            Some(chunk) => Ok((chunk, false)),
+            None => catch_unwind(AssertUnwindSafe(sample)),
+        };
+        let panicked = sampled.is_err();
+        let (chunk, filled) = sampled.unwrap_or((Chunk::AIR, false));
+        let (chunk, replayed) = replay.run(chunk);
+        let signs = if panicked { Signs::UNKNOWN } else { Signs::of(&chunk, isovalue) };
+        let time = start.elapsed();
+        Filled { job, generation, position, chunk, signs, replayed, filled, panicked, time }
+    }
+}
+
+impl Heart {
+    /// Whether chunks wait to be sampled.
+    pub(crate) fn has_to_ask(&self) -> bool {
+        !self.to_fill.is_empty() || !self.crowded.is_empty()
+    }
+
+    /// Asks for the samples of the chunks that wait for them, the most urgent first, until this many jobs are under way.
+    /// `start`: starts a job.
+    pub(crate) fn ask_for_samples(&mut self, limit: usize, mut start: impl FnMut(FillJob) -> Ticket) {
+        let Some(recipe) = self.recipe.clone() else { return };
+        while self.sampling < limit {
+            let Self { to_fill, cover, table, .. } = self;
+            let Some(key) = to_fill.pop(cover, |key| table.is_queued(*key)) else { break };
+            let urgency = cover.urgency(key.position);
+            let job = self.fill_job(&recipe, key.position, urgency);
+            self.table.ask(key, job.job, start(job));
+            self.sampling += 1;
+        }
+        while self.sampling < limit
+            && let Some(key) = self.crowded.pop()
+        {
+            let is_coming = self.table.contains(key) || self.remote.contains_key(&key.position);
+            if is_coming || self.samples.is_resident(key.position) {
+                continue;
+            }
+            let job = self.fill_job(&recipe, key.position, u32::MAX);
+            self.remote.insert(key.position, (job.job, start(job)));
+            self.sampling += 1;
+        }
+    }
+
+    /// Takes what jobs have sampled, as long as there is time. `least`: this many in any case. Returns those that were taken.
+    pub(crate) fn take_filled(&mut self, least: usize, until: Instant, mut note: impl FnMut(&Filled)) {
+        self.filled_later.extend(self.filled.take());
+        let mut taken = 0;
+        while (taken < least || Instant::now() < until)
+            && let Some(filled) = self.filled_later.pop_front()
+        {
+            taken += 1;
+            if filled.generation == self.samples.generation() {
+                note(&filled);
+                self.samples_arrived(filled);
+            }
+        }
+    }
+
+    /// Whether sampled chunks wait to be taken.
+    pub(crate) fn has_filled(&self) -> bool {
+        !self.filled_later.is_empty() || !self.filled.is_empty()
+    }
+
+    /// A job has sampled a chunk.
+    fn samples_arrived(&mut self, filled: Filled) {
+        let Filled { job, position, chunk, signs, replayed, .. } = filled;
+        let key = ChunkKey::finest(position);
+        if self.table.is_asked(key, job) {
+            self.sampling -= 1;
+            self.take_in(key, chunk, signs, Some(replayed));
+        } else if self.remote.get(&position).is_some_and(|(number, _)| *number == job) {
+            self.remote.remove(&position);
+            self.sampling -= 1;
+            if !self.table.contains(key) && !self.samples.is_resident(position) {
+                let (edit, _) = self.samples.load(position, chunk, Some(replayed));
+                self.late_edits.extend(Some(edit).filter(|edit| !edit.is_empty()));
+                self.samples.unload(position);
+            }
+        }
+    }
+
+    /// Fills a loaded chunk at once where that needs no job.
+    pub(super) fn fill(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
+        let Some(recipe) = self.recipe.clone() else { return };
+        if self.samples.is_resident(key.position) {
+            self.table.samples_arrived(key, None);
+            self.filled_around(key);
+        } else if !self.samples.needs_replay(key.position)
+            && let Some(chunk) = self.bound(&recipe, key.position)
+        {
+            stats.bounded += 1;
+            let signs = Signs::of(&chunk, self.isovalue);
+            self.take_in(key, chunk, signs, None);
+        } else {
+            self.table.queue(key);
+            self.to_fill.add(key, &self.cover);
+        }
+    }
+
+    /// Takes in the samples of a loaded chunk, and the stamps that came before them.
+    fn take_in(&mut self, key: ChunkKey, chunk: Chunk<i16>, signs: Signs, replayed: Option<Replayed>) {
+        // Whoever was to sample it for its stamps alone comes too late.
+        if self.remote.remove(&key.position).is_some() {
+            self.sampling -= 1;
+        }
+        let (edit, affected) = self.samples.load(key.position, chunk, replayed);
+        self.late_edits.extend(Some(edit).filter(|edit| !edit.is_empty()));
+        // At the border the samples have been clipped.
+        let at_border = self.samples.newest().bounds().is_some_and(|bounds| {
+            (0..3).any(|axis| [bounds.min[axis], bounds.max[axis] - 1].contains(&key.position[axis]))
+        });
+        let signs = if at_border || !affected.is_empty() { Signs::UNKNOWN } else { signs };
+        self.table.samples_arrived(key, Some(signs));
+        self.filled_around(key);
+        // What has not been drawn is meshed once all around it is filled.
+        let chunks = affected.into_iter().map(ChunkKey::finest);
+        self.changed(Pending {
+            chunks: chunks.filter(|key| self.table.is_shown(*key)).collect(),
+            ..Pending::default()
+        });
+    }
+
+    /// A chunk has got its samples: who waited for them may go on.
+    fn filled_around(&mut self, key: ChunkKey) {
+        self.groups.wake();
+        self.unblock_transition(key);
+        if self.cover.drops_samples() {
+            self.droppable.push(key);
+        }
+    }
+
+    fn fill_job(&self, recipe: &Recipe, position: [i32; 3], urgency: u32) -> FillJob {
+        FillJob {
+            job: new_number(),
+            generation: self.samples.generation(),
+            position,
+            source: recipe.source.clone(),
+            cells: recipe.cells,
+            spacing: recipe.spacing,
+            isovalue: self.isovalue,
+            replay: self.samples.replay(position, recipe.empty_grid()),
+            urgency,
+        }
+    }
+
+    /// What the source is certain of without sampling.
+    fn bound(&mut self, Recipe { source, cells, spacing, .. }: &Recipe, position: [i32; 3]) -> Option<Chunk<i16>> {
+        if self.bounds.len() > MOST_BOXES {
+            self.bounds.clear();
+        }
+        let of_box = || bound_box(source.as_ref(), position, *cells, *spacing);
+        let of_box = self.bounds.entry(Chunk::<i16>::bound_box(position)).or_insert_with(of_box).clone();
+        bound_chunk(source.as_ref(), of_box, position, *cells, *spacing)
+    }
+}
+
+/// What a source is certain of for the box of chunks around one. A source that panics is certain of nothing.
+fn bound_box(source: &dyn Source, position: [i32; 3], cells: u32, spacing: f64) -> Option<Chunk<i16>> {
+    let lowest = Chunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
+    let of_box = || Chunk::box_without_sampling(source, lowest, BOUND_BOX_CHUNKS as u32, cells, spacing);
+    catch_unwind(AssertUnwindSafe(of_box)).ok().flatten()
+}
+
+/// What a source is certain of for a chunk, given what it is for the box around it.
+fn bound_chunk(
+    source: &dyn Source,
+    of_box: Option<Chunk<i16>>,
+    position: [i32; 3],
+    cells: u32,
+    spacing: f64,
+) -> Option<Chunk<i16>> {
+    let of_chunk = || Chunk::without_sampling_in(of_box, source, position, cells, spacing);
+    catch_unwind(AssertUnwindSafe(of_chunk)).ok().flatten()
+}

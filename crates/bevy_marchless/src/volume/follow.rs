@@ -1,0 +1,216 @@
+//! Chunks come and go: each becomes what the cover asks of it.
+
+use bevy_platform::time::Instant;
+use marchless::{Chunk, Region};
+
+use super::Heart;
+use super::table::Unloaded;
+use crate::budget::ENTITY_TIME;
+use crate::chunk::ChunkKey;
+use crate::cover::Wanted;
+use crate::stats::TerrainStats;
+
+/// Each update at least this many chunks come, and as many go.
+const LEAST: usize = 4;
+
+impl Heart {
+    /// Whether chunks wait to come or to go.
+    pub(crate) fn has_to_follow(&self) -> bool {
+        let is_idle = self.unlisted.is_empty() && self.arriving.is_empty() && self.leaving.is_empty();
+        !is_idle || !self.droppable.is_empty() || self.has_lost_leaves()
+    }
+
+    /// Lets chunks go and come until it is late, those that are wanted most first.
+    pub(crate) fn follow(&mut self, until: Instant, stats: &mut TerrainStats) {
+        if self.recipe.is_none() {
+            return;
+        }
+        self.list_viewers(until);
+        // Both have half of the time, unless as many are on their way out as viewers see: then hardly any come.
+        let is_crowded = self.leaving.len() as f64 > self.cover.size();
+        let share = if self.arriving.is_empty() || is_crowded { 1 } else { 2 };
+        let now = Instant::now();
+        let until_gone = now + until.saturating_duration_since(now) / share;
+        let despawning = |heart: &Self| heart.table.released_len() as u32 * ENTITY_TIME;
+        let mut done = 0;
+        while (done < LEAST || Instant::now() + despawning(self) < until_gone)
+            && let Some(key) = self.leaving.pop()
+        {
+            self.settle(key, stats);
+            done += 1;
+        }
+        let mut done = 0;
+        while (done < LEAST || !is_crowded && Instant::now() + despawning(self) < until)
+            && let Some(key) = self.next_arriving()
+        {
+            self.settle(key, stats);
+            done += 1;
+        }
+        if self.has_lost_leaves() {
+            self.give_up_lost_leaves();
+        }
+        if self.is_filled() && self.transition.is_none() {
+            let mut done = 0;
+            while (done < LEAST || Instant::now() < until)
+                && let Some(key) = self.droppable.pop()
+            {
+                self.drop_samples(key);
+                done += 1;
+            }
+        }
+    }
+
+    /// Whether leaves wait though nothing is left to be done: they went out of range before they were drawn, and of what is not
+    /// drawn the margin keeps nothing.
+    fn has_lost_leaves(&self) -> bool {
+        self.table.makes_meshes() && self.table.counts().waiting > 0 && self.is_idle()
+    }
+
+    /// Goes through all chunks, once after viewers have come to rest.
+    fn give_up_lost_leaves(&mut self) {
+        let waits = |key: &ChunkKey| self.table.is_leaf(*key) && !self.table.is_shown(*key);
+        let lost: Vec<ChunkKey> = self.table.keys().filter(waits).collect();
+        lost.into_iter().for_each(|key| self.leaving.push(key));
+    }
+
+    /// Lists the chunks of new viewers, one at least.
+    fn list_viewers(&mut self, until: Instant) {
+        while let Some(id) = self.unlisted.pop_front() {
+            let Self { cover, arriving, .. } = self;
+            cover.list(id, |position| arriving.add_unsorted(ChunkKey::finest(position), id));
+            if Instant::now() >= until {
+                break;
+            }
+        }
+    }
+
+    /// The game has despawned a chunk's entity. Its samples stay: its neighbours' meshes need them.
+    pub(crate) fn despawned(&mut self, key: ChunkKey, entity: bevy_ecs::entity::Entity) {
+        self.table.despawned(key, entity);
+    }
+
+    fn next_arriving(&mut self) -> Option<ChunkKey> {
+        let Self { arriving, cover, table, .. } = self;
+        arriving.pop(cover, |key| table.contains(*key) || cover.wanted(key.position, Wanted::Samples) > Wanted::Gone)
+    }
+
+    /// Makes of a chunk what the cover asks of it.
+    fn settle(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
+        let Some(extent) = self.recipe.as_ref().map(|recipe| recipe.extent) else { return };
+        let wanted = self.cover.wanted(key.position, self.table.kept(key));
+        match (self.table.contains(key), wanted) {
+            (false, Wanted::Gone) => return,
+            (false, _) => self.load(key, wanted, extent, stats),
+            (true, Wanted::Gone) => return self.unload(key, stats),
+            (true, Wanted::Samples) => self.hide(key),
+            (true, Wanted::Mesh) if self.table.is_leaf(key) => self.load_lost_neighbours(key, extent, stats),
+            (true, Wanted::Mesh) => self.table.promote(key),
+        }
+        if self.cover.drops_samples() {
+            self.revive_or_drop(key);
+        }
+        if self.table.is_unasked(key) {
+            self.fill(key, stats);
+        }
+    }
+
+    fn load(&mut self, key: ChunkKey, wanted: Wanted, extent: Region, stats: &mut TerrainStats) {
+        self.table.load(key, wanted, extent);
+        stats.loaded += 1;
+    }
+
+    /// Loads neighbours of a leaf that stays for the margin's sake alone, where they went before the viewer came back: nobody
+    /// else would, and edits of the chunk would wait for them for ever.
+    fn load_lost_neighbours(&mut self, key: ChunkKey, extent: Region, stats: &mut TerrainStats) {
+        if !self.table.lacks_samples(key) || self.cover.contains(key.position) {
+            return; // What a chunk in range lacks comes anyway.
+        }
+        for near in key.around().filter(|near| extent.contains(near.position)) {
+            let wanted = self.cover.wanted(near.position, Wanted::Samples);
+            if wanted > Wanted::Gone && !self.table.contains(near) {
+                self.load(near, wanted, extent, stats);
+                self.fill(near, stats);
+            }
+        }
+    }
+
+    /// Forgets a chunk, but for its edits.
+    fn unload(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
+        self.hide(key);
+        match self.table.unload(key) {
+            Unloaded::Nothing => {}
+            Unloaded::Job => self.sampling -= 1,
+            Unloaded::Samples => self.samples.unload(key.position),
+        }
+        self.samples.unload_shown(key.position);
+        stats.unloaded += 1;
+    }
+
+    /// Takes a chunk from the screen.
+    fn hide(&mut self, key: ChunkKey) {
+        if self.table.is_leaf(key) {
+            self.groups.withdraw_from(key);
+            self.groups.wake();
+            self.table.demote(key);
+            self.leave_transition(key);
+        }
+    }
+
+    /// Wants the dropped samples of a chunk again, or notes that they may be dropped.
+    fn revive_or_drop(&mut self, key: ChunkKey) {
+        if self.table.waits_for_samples(key) || self.transition_lacks(key) {
+            self.revive_around(key);
+        } else if self.table.is_dropped(key) {
+            if self.cover.wants_samples(key.position) {
+                self.revive(key);
+            }
+        } else {
+            self.droppable.push(key);
+        }
+    }
+
+    /// Drops the samples of a chunk if nobody needs them for now.
+    fn drop_samples(&mut self, key: ChunkKey) {
+        if self.may_drop(key) && self.cover.may_drop_samples(key.position) {
+            self.samples.unload(key.position);
+            self.samples.unload_shown(key.position);
+            self.table.samples_dropped(key);
+        }
+    }
+
+    /// Whether samples could be had again, and nothing reads them for now.
+    fn may_drop(&self, key: ChunkKey) -> bool {
+        let Some(recipe) = &self.recipe else { return false };
+        let is_done = |near: ChunkKey| {
+            self.table.is_current(near) && !self.groups.is_claimed(near) && !self.groups.is_pending(near)
+        };
+        self.table.is_filled(key)
+            && matches!(self.samples.newest().chunk(key.position), Some(Chunk::Samples(_)))
+            && !self.samples.is_held(key.position)
+            && key.around().filter(|near| recipe.extent.contains(near.position)).all(is_done)
+    }
+
+    /// Notes that the samples of a chunk, and of those around it, may now be dropped.
+    pub(super) fn may_drop_around(&mut self, key: ChunkKey) {
+        if self.cover.drops_samples() {
+            key.around().for_each(|near| self.droppable.push(near));
+        }
+    }
+
+    /// Asks for the dropped samples of a chunk.
+    pub(super) fn revive(&mut self, key: ChunkKey) {
+        if self.table.revive(key) {
+            self.arriving.add_first(key);
+        }
+    }
+
+    /// Asks for all dropped samples around a chunk.
+    fn revive_around(&mut self, key: ChunkKey) {
+        key.around().for_each(|near| self.revive(near));
+    }
+
+    /// Sees to what a chunk lacks before others.
+    pub(super) fn look_at(&mut self, key: ChunkKey) {
+        self.arriving.add_first(key);
+    }
+}

@@ -1,0 +1,334 @@
+//! [`Groups`]: what changed together is meshed from one snapshot and shown together.
+
+use core::mem;
+use core::time::Duration;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use bevy_mesh::Mesh;
+use bevy_platform::collections::HashMap;
+use marchless::{Chunk, MeshBuffer};
+
+use crate::chunk::ChunkKey;
+use crate::jobs::{Ticket, new_number};
+use crate::stats::Since;
+
+/// The changed chunks that wait to be meshed, and those that are being meshed.
+///
+/// No chunk is in two pending sets, or claimed by two running groups, so results can never be shown out of order.
+#[derive(Default)]
+pub(crate) struct Groups {
+    /// Changed chunks, in the order of their changes.
+    pending: BTreeMap<u64, Pending>,
+    /// Which pending set a chunk is in.
+    waiting: HashMap<ChunkKey, u64>,
+    running: BTreeMap<u64, Group>,
+    /// Which group works on a chunk.
+    claims: HashMap<ChunkKey, u64>,
+    /// How many running groups give way to edits.
+    yielding: usize,
+    /// Whether some pending set may have become free; those up to this one have been looked at since.
+    is_awake: bool,
+    looked_at: u64,
+}
+
+/// Changed chunks that are to be meshed from one snapshot.
+#[derive(Debug, Default)]
+pub(crate) struct Pending {
+    pub(crate) chunks: BTreeSet<ChunkKey>,
+    /// Those of them whose meshes, where they have been drawn, stay as they are.
+    pub(crate) look_the_same: BTreeSet<ChunkKey>,
+    /// When the first of the edits was asked for; `None` where none was.
+    pub(crate) since: Option<Since>,
+}
+
+/// Chunks that are being meshed from one snapshot, to be shown in one update.
+pub(crate) struct Group {
+    /// The chunks that it claims: its members, and those that cannot be meshed yet.
+    pub(super) chunks: BTreeSet<ChunkKey>,
+    /// The samples of its members and of the chunks around them, where they are not shown yet.
+    pub(super) snapshot: BTreeMap<[i32; 3], Chunk<i16>>,
+    /// The number of the look that its meshes have.
+    pub(super) look: u64,
+    pub(super) since: Option<Since>,
+    pub(super) purpose: Purpose,
+    /// How many chunks will have been meshed when it is complete.
+    pub(super) members: usize,
+    pub(super) meshed: Vec<Meshed>,
+    /// The rights to its jobs' results.
+    pub(super) tickets: Vec<Ticket>,
+}
+
+/// Why chunks are meshed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// Their samples have changed.
+    Edit,
+    /// A chunk is drawn for the first time; gives way to edits.
+    FirstMesh,
+    /// A chunk gets another look; gives way to edits.
+    Restyle,
+}
+
+impl Purpose {
+    pub(crate) const fn gives_way(self) -> bool {
+        !matches!(self, Self::Edit)
+    }
+}
+
+/// A chunk's new mesh.
+pub(crate) struct Meshed {
+    pub(crate) position: [i32; 3],
+    pub(crate) geometry: Arc<MeshBuffer>,
+    /// The same as an asset, where assets are wanted and there is something to draw.
+    pub(crate) mesh: Option<Mesh>,
+    /// How long it took.
+    pub(crate) time: Duration,
+}
+
+impl Meshed {
+    /// Nothing to draw.
+    pub(crate) fn empty(position: [i32; 3]) -> Self {
+        Self { position, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
+    }
+}
+
+impl Groups {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.pending.is_empty() && self.running.is_empty()
+    }
+
+    /// How many chunks wait to be meshed or are being meshed.
+    pub(crate) fn len(&self) -> usize {
+        self.waiting.len() + self.claims.len()
+    }
+
+    /// Whether some pending set may start.
+    pub(super) const fn may_start(&self) -> bool {
+        self.is_awake
+    }
+
+    /// How many running groups give way to edits.
+    pub(super) const fn yielding(&self) -> usize {
+        self.yielding
+    }
+
+    /// Whether a changed chunk waits to be meshed.
+    pub(super) fn is_pending(&self, key: ChunkKey) -> bool {
+        self.waiting.contains_key(&key)
+    }
+
+    /// Whether a chunk is being meshed.
+    pub(super) fn is_claimed(&self, key: ChunkKey) -> bool {
+        self.claims.contains_key(&key)
+    }
+
+    /// Notes that chunks have changed together; sets that overlap become one.
+    pub(super) fn add(&mut self, mut new: Pending) {
+        if new.chunks.is_empty() {
+            return;
+        }
+        let overlapping: BTreeSet<u64> = new.chunks.iter().filter_map(|key| self.waiting.get(key)).copied().collect();
+        for mut other in overlapping.into_iter().filter_map(|id| self.pending.remove(&id)) {
+            new.merge(&mut other);
+        }
+        self.insert(new_number(), new);
+        self.wake();
+    }
+
+    /// Lets the latest [free](Self::next_free) set wait again, until something wakes the groups.
+    pub(super) fn put_back(&mut self, pending: Pending) {
+        self.insert(self.looked_at, pending);
+    }
+
+    fn insert(&mut self, id: u64, pending: Pending) {
+        self.waiting.extend(pending.chunks.iter().map(|key| (*key, id)));
+        self.pending.insert(id, pending);
+    }
+
+    /// Something has changed for which a pending set may wait.
+    pub(super) const fn wake(&mut self) {
+        (self.is_awake, self.looked_at) = (true, 0);
+    }
+
+    /// The next pending set on whose chunks nobody works. Groups that give way are withdrawn.
+    pub(super) fn next_free(&mut self) -> Option<Pending> {
+        while self.is_awake {
+            let Some(id) = self.pending.range(self.looked_at + 1..).next().map(|(id, _)| *id) else {
+                self.is_awake = false;
+                break;
+            };
+            self.looked_at = id;
+            let Some(pending) = self.pending.remove(&id) else { continue };
+            if self.give_way(&pending.chunks) {
+                pending.chunks.iter().for_each(|key| _ = self.waiting.remove(key));
+                return Some(pending);
+            }
+            self.pending.insert(id, pending);
+        }
+        None
+    }
+
+    /// Whether nobody works on chunks, once the groups that give way have done so.
+    fn give_way(&mut self, chunks: &BTreeSet<ChunkKey>) -> bool {
+        let claimed: BTreeSet<u64> = chunks.iter().filter_map(|key| self.claims.get(key)).copied().collect();
+        claimed.into_iter().all(|id| self.withdraw(id))
+    }
+
+    /// Withdraws a group if it gives way.
+    fn withdraw(&mut self, id: u64) -> bool {
+        let gives_way = self.running.get(&id).is_none_or(|group| group.purpose.gives_way());
+        if gives_way {
+            self.remove(id);
+        }
+        gives_way
+    }
+
+    /// Withdraws the group that works on a chunk if it gives way.
+    pub(super) fn withdraw_from(&mut self, key: ChunkKey) {
+        if let Some(id) = self.claims.get(&key) {
+            self.withdraw(*id);
+        }
+    }
+
+    /// Starts a group, whose jobs go by its number.
+    pub(super) fn start(&mut self, group: Group) -> u64 {
+        let id = new_number();
+        self.claims.extend(group.chunks.iter().map(|key| (*key, id)));
+        self.yielding += usize::from(group.purpose.gives_way());
+        self.running.insert(id, group);
+        id
+    }
+
+    /// A running group.
+    pub(super) fn get_mut(&mut self, id: u64) -> Option<&mut Group> {
+        self.running.get_mut(&id)
+    }
+
+    /// Takes out a group, and frees the chunks that it claims.
+    pub(super) fn remove(&mut self, id: u64) -> Option<Group> {
+        let group = self.running.remove(&id)?;
+        group.chunks.iter().for_each(|key| _ = self.claims.remove(key));
+        self.yielding -= usize::from(group.purpose.gives_way());
+        if !group.purpose.gives_way() {
+            self.wake();
+        }
+        Some(group)
+    }
+
+    /// Forgets all groups, and returns their chunks; jobs that have not begun are withdrawn.
+    pub(super) fn take_all(&mut self) -> Vec<Pending> {
+        let Self { pending, running, .. } = mem::take(self);
+        let of_group = |group: Group| {
+            let look_the_same = BTreeSet::new();
+            Pending { chunks: group.chunks, look_the_same, since: group.since }
+        };
+        running.into_values().map(of_group).chain(pending.into_values()).collect()
+    }
+
+    /// All that holds of any groups.
+    #[cfg(test)]
+    pub(super) fn check(&self) {
+        for (id, pending) in &self.pending {
+            assert!(pending.chunks.iter().all(|key| self.waiting.get(key) == Some(id)));
+        }
+        for (id, group) in &self.running {
+            assert!(group.chunks.iter().all(|key| self.claims.get(key) == Some(id)));
+            assert!(group.meshed.len() < group.members);
+        }
+        assert_eq!(self.waiting.len(), self.pending.values().map(|pending| pending.chunks.len()).sum::<usize>());
+        assert_eq!(self.claims.len(), self.running.values().map(|group| group.chunks.len()).sum::<usize>());
+        assert_eq!(self.yielding, self.running.values().filter(|group| group.purpose.gives_way()).count());
+    }
+}
+
+impl Group {
+    /// Takes in a mesh of one of its members.
+    pub(crate) fn push(&mut self, meshed: Meshed) {
+        self.meshed.push(meshed);
+    }
+
+    pub(crate) const fn gives_way(&self) -> bool {
+        self.purpose.gives_way()
+    }
+}
+
+impl Pending {
+    /// Takes in all of another set. What looks the same after one change may not after the other.
+    fn merge(&mut self, other: &mut Self) {
+        self.look_the_same.retain(|key| !other.chunks.contains(key) || other.look_the_same.contains(key));
+        other.look_the_same.retain(|key| !self.chunks.contains(key) || self.look_the_same.contains(key));
+        self.look_the_same.append(&mut other.look_the_same);
+        self.chunks.append(&mut other.chunks);
+        self.since = Since::earlier(self.since, other.since);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(xs: &[i32]) -> BTreeSet<ChunkKey> {
+        xs.iter().map(|&x| ChunkKey::finest([x, 0, 0])).collect()
+    }
+
+    fn pending(xs: &[i32], same: &[i32]) -> Pending {
+        Pending { chunks: set(xs), look_the_same: set(same), since: None }
+    }
+
+    fn group(xs: &[i32], purpose: Purpose) -> Group {
+        Group {
+            chunks: set(xs),
+            snapshot: BTreeMap::new(),
+            look: 0,
+            since: None,
+            purpose,
+            members: 1,
+            meshed: Vec::new(),
+            tickets: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn an_edit_waits_for_edits_alone() {
+        let mut groups = Groups::default();
+        let edit = groups.start(group(&[0], Purpose::Edit));
+        groups.start(group(&[1], Purpose::FirstMesh));
+        groups.start(group(&[2], Purpose::Restyle));
+        groups.add(pending(&[1, 2], &[]));
+        groups.add(pending(&[0, 3], &[]));
+        assert_eq!(groups.next_free().expect("the others give way").chunks, set(&[1, 2]));
+        assert!(groups.next_free().is_none(), "the edit is shown first");
+        assert_eq!((groups.yielding(), groups.is_claimed(ChunkKey::finest([1, 0, 0]))), (0, false));
+        groups.check();
+        assert!(groups.remove(edit).is_some());
+        assert_eq!(groups.next_free().expect("it is done").chunks, set(&[0, 3]));
+        assert!(groups.next_free().is_none() && groups.is_empty());
+    }
+
+    #[test]
+    fn a_set_that_is_put_back_waits_for_a_change() {
+        let mut groups = Groups::default();
+        groups.add(pending(&[0], &[]));
+        let again = groups.next_free().expect("nobody works on it");
+        groups.put_back(again);
+        assert!(groups.next_free().is_none());
+        groups.wake();
+        assert!(groups.next_free().is_some());
+    }
+
+    #[test]
+    fn sets_that_overlap_become_one() {
+        let mut groups = Groups::default();
+        groups.add(pending(&[0, 1], &[0, 1]));
+        groups.add(pending(&[4, 5], &[4]));
+        assert_eq!(groups.pending.len(), 2);
+        groups.add(pending(&[1, 2, 4, 6], &[4, 6]));
+        groups.check();
+        let only = groups.next_free().expect("one set");
+        assert_eq!(only.chunks, set(&[0, 1, 2, 4, 5, 6]));
+        assert_eq!(only.look_the_same, set(&[0, 4, 6]), "1 changes with the later set, 5 with the earlier");
+        groups.add(pending(&[], &[]));
+        assert!(groups.next_free().is_none() && groups.is_empty());
+    }
+}

@@ -1,0 +1,49 @@
+//! How much memory samples take.
+
+use marchless::Chunk;
+
+use super::Heart;
+use super::samples::same_samples;
+
+impl Heart {
+    /// How much memory the plugin's notes about chunks take, in bytes.
+    pub(crate) fn notes_bytes(&self) -> usize {
+        self.table.len() * super::table::ENTRY_BYTES
+    }
+
+    /// How much memory the samples of at most `most` chunks take, in bytes, from a position on; and the position where to
+    /// go on, if any are left.
+    pub(crate) fn sample_bytes_from(&self, from: [i32; 3], most: usize) -> (usize, Option<[i32; 3]>) {
+        let mut newest = self.samples.newest().chunks_from(from).peekable();
+        let mut shown = self.samples.shown().chunks_from(from).peekable();
+        let mut bytes = 0;
+        for done in 0.. {
+            let Some(next) = newest.peek().into_iter().chain(shown.peek()).map(|(position, _)| *position).min() else {
+                break;
+            };
+            if done == most {
+                return (bytes, Some(next));
+            }
+            let [newest, shown] =
+                [&mut newest, &mut shown].map(|chunks| chunks.next_if(|(position, _)| *position == next));
+            let entries = [newest, shown].into_iter().flatten();
+            bytes += entries.map(|_| size_of::<([i32; 3], Chunk<i16>)>()).sum::<usize>();
+            bytes += match (newest, shown) {
+                (Some((_, newest)), Some((_, shown))) if !same_samples(newest, shown) => {
+                    bytes_of(newest) + bytes_of(shown)
+                }
+                (Some((_, chunk)), _) | (None, Some((_, chunk))) => bytes_of(chunk),
+                (None, None) => 0,
+            };
+        }
+        (bytes, None)
+    }
+}
+
+/// How much memory a chunk's samples take, in bytes.
+fn bytes_of(chunk: &Chunk<i16>) -> usize {
+    match chunk {
+        Chunk::Uniform(_) => 0,
+        Chunk::Samples(samples) => 2 * samples.weights.capacity() + samples.materials.capacity(),
+    }
+}

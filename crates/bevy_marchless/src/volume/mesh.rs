@@ -1,0 +1,268 @@
+//! Groups start and are shown.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy_ecs::entity::Entity;
+use bevy_platform::time::Instant;
+use marchless::{Chunk, Grid};
+
+use super::groups::{Group, Meshed, Pending, Purpose};
+use super::samples::same_samples;
+use super::table::{Drawn, Place};
+use super::{Heart, Restyled};
+use crate::chunk::ChunkKey;
+use crate::jobs::Ticket;
+use crate::stats::Since;
+
+/// A group that has not started, and those of its chunks that are to be meshed.
+pub(crate) struct Prepared {
+    pub(crate) group: Group,
+    pub(crate) to_mesh: Vec<[i32; 3]>,
+}
+
+/// What a job has meshed.
+pub(crate) enum MeshResult {
+    /// A chunk of the group with this number.
+    OfGroup(u64, Meshed),
+    /// A chunk at the isovalue to come, with the number of its look.
+    Restyled(Restyled),
+}
+
+/// A new mesh, and where to show it.
+pub(crate) struct Swap {
+    pub(crate) key: ChunkKey,
+    pub(crate) place: Place,
+    pub(crate) meshed: Meshed,
+    /// The number of the look that it has.
+    pub(crate) look: u64,
+}
+
+/// What is to be shown in one update.
+#[derive(Default)]
+pub(crate) struct Shown {
+    pub(crate) swaps: Vec<Swap>,
+    /// When the edits among it were asked for, where there are some.
+    pub(crate) since: Vec<Since>,
+}
+
+impl Heart {
+    /// Whether chunks wait to be meshed, or to be shown.
+    pub(crate) fn has_to_mesh(&self) -> bool {
+        self.groups.may_start() || self.table.ready_len() > 0 || !self.to_mesh.is_empty() || self.has_to_restyle()
+    }
+
+    /// Whether meshes wait to be taken.
+    pub(crate) fn has_meshed(&self) -> bool {
+        !self.meshed_later.is_empty() || !self.meshed.is_empty()
+    }
+
+    /// Goes through the chunks that can be drawn and are not up to date, until it is late; those without a surface need no job.
+    pub(crate) fn sort_ready(&mut self, until: Instant) {
+        let mut no_longer_drawn = BTreeSet::new();
+        let mut done = 0;
+        while let Some(key) = self.table.next_ready() {
+            if self.groups.is_pending(key) || self.groups.is_claimed(key) {
+                // It is drawn with the others, and looked at again then.
+                continue;
+            }
+            let is_empty = self.table.is_without_surface(key, self.isovalue)
+                || is_uniform_around(self.samples.newest(), key.position);
+            if !is_empty {
+                self.to_mesh.add(key, &self.cover);
+            } else if self.table.set_empty(key) {
+                self.samples.show_newest(key.position);
+                self.shown(key);
+            } else {
+                no_longer_drawn.insert(key);
+            }
+            done += 1;
+            if done % 4 == 0 && Instant::now() >= until {
+                break;
+            }
+        }
+        self.groups.add(Pending { chunks: no_longer_drawn, ..Pending::default() });
+    }
+
+    /// The next changed chunks on which nobody works.
+    pub(crate) fn next_changed(&mut self) -> Option<Prepared> {
+        while let Some(pending) = self.groups.next_free() {
+            if let Some(prepared) = self.prepare(pending, Purpose::Edit) {
+                return Some(prepared);
+            }
+        }
+        None
+    }
+
+    /// The most urgent chunk that is to be drawn for the first time, or anew; `None` where none waits, or as many groups
+    /// that give way are under way as `limit` says. The second number: how urgent it is.
+    pub(crate) fn next_first_mesh(&mut self, limit: usize) -> Option<(Prepared, u32)> {
+        while self.groups.yielding() < limit {
+            let Self { to_mesh, cover, table, groups, .. } = self;
+            let waits = |key: &ChunkKey| table.is_ready(*key) && !groups.is_pending(*key) && !groups.is_claimed(*key);
+            let key = to_mesh.pop(cover, waits)?;
+            let urgency = cover.urgency(key.position);
+            if let Some(prepared) = self.prepare_one(key, Purpose::FirstMesh) {
+                return Some((prepared, urgency));
+            }
+        }
+        None
+    }
+
+    pub(super) fn prepare_one(&mut self, key: ChunkKey, purpose: Purpose) -> Option<Prepared> {
+        self.prepare(Pending { chunks: BTreeSet::from([key]), ..Pending::default() }, purpose)
+    }
+
+    /// Finds what of changed chunks is to be meshed; `None` where that is nothing, or they have to wait for samples.
+    fn prepare(&mut self, pending: Pending, purpose: Purpose) -> Option<Prepared> {
+        // What is drawn changes with the others: where samples around it are missing, all wait for them.
+        let lacking: Vec<ChunkKey> = pending
+            .chunks
+            .iter()
+            .copied()
+            .filter(|key| self.table.is_shown(*key) && self.lacks_samples(*key))
+            .collect();
+        if !lacking.is_empty() {
+            for key in lacking {
+                self.table.set_stale(key);
+                self.look_at(key);
+            }
+            if purpose == Purpose::Edit {
+                self.groups.put_back(pending);
+            }
+            return None;
+        }
+        let Pending { chunks, look_the_same, since } = pending;
+        let mut group = Group {
+            chunks,
+            snapshot: BTreeMap::new(),
+            look: self.look.number,
+            since,
+            purpose,
+            members: 0,
+            meshed: Vec::new(),
+            tickets: Vec::new(),
+        };
+        let mut to_mesh = Vec::new();
+        for key in group.chunks.iter().copied().filter(|key| self.table.can_be_drawn(*key)) {
+            let samples = self.samples.newest().neighbourhood_view(key.position);
+            let shown = self.samples.shown().neighbourhood_view(key.position);
+            for (near, (chunk, shown)) in key.around().zip(samples.chunks().iter().zip(shown.chunks())) {
+                let Some(chunk) = chunk.filter(|chunk| !shown.is_some_and(|shown| same_samples(shown, chunk))) else {
+                    continue;
+                };
+                if group.chunks.contains(&near) || !self.table.is_shown(near) {
+                    group.snapshot.entry(near.position).or_insert_with(|| chunk.clone());
+                }
+            }
+            if self.table.is_current(key) && look_the_same.contains(&key) {
+                continue;
+            }
+            group.members += 1;
+            if samples.is_uniform() {
+                group.meshed.push(Meshed::empty(key.position));
+            } else {
+                to_mesh.push(key.position);
+            }
+        }
+        if group.members == 0 && group.snapshot.is_empty() {
+            return None;
+        }
+        Some(Prepared { group, to_mesh })
+    }
+
+    /// Starts a group whose chunks are meshed in jobs. `start`: starts the job of the chunk at a position for the group with
+    /// this number.
+    pub(crate) fn start(&mut self, prepared: Prepared, mut start: impl FnMut(&Self, u64, [i32; 3]) -> Ticket) {
+        let Prepared { group, to_mesh } = prepared;
+        let id = self.groups.start(group);
+        let tickets: Vec<Ticket> = to_mesh.into_iter().map(|position| start(self, id, position)).collect();
+        if let Some(group) = self.groups.get_mut(id) {
+            group.tickets = tickets;
+        }
+    }
+
+    /// Takes what jobs have meshed, and returns groups that are complete. Those that give way are taken as long as
+    /// `may_take_more`; edits always.
+    pub(crate) fn take_meshed(
+        &mut self,
+        mut may_take_more: impl FnMut() -> bool,
+        mut note: impl FnMut(&Meshed),
+    ) -> Option<Group> {
+        self.meshed_later.extend(self.meshed.take());
+        for _ in 0..self.meshed_later.len() {
+            match self.meshed_later.pop_front()? {
+                MeshResult::Restyled(restyled) => {
+                    note(&restyled.meshed);
+                    self.take_restyled(restyled);
+                }
+                MeshResult::OfGroup(id, meshed) => {
+                    let Some(group) = self.groups.get_mut(id) else { continue };
+                    if group.gives_way() && !may_take_more() {
+                        self.meshed_later.push_back(MeshResult::OfGroup(id, meshed));
+                        continue;
+                    }
+                    note(&meshed);
+                    group.meshed.push(meshed);
+                    if group.meshed.len() == group.members {
+                        return self.groups.remove(id);
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// Shows all chunks of a complete group.
+    pub(crate) fn show(&mut self, group: Group) -> Shown {
+        let Group { chunks, snapshot, look, since, meshed, .. } = group;
+        let swaps = meshed.into_iter().map(|meshed| self.swap(meshed, look)).collect();
+        for (position, chunk) in snapshot {
+            let key = ChunkKey::finest(position);
+            if self.table.contains(key) && (chunks.contains(&key) || !self.table.is_shown(key)) {
+                self.samples.show(position, chunk);
+            }
+        }
+        for key in chunks {
+            self.shown(key);
+        }
+        Shown { swaps, since: since.into_iter().collect() }
+    }
+
+    /// A chunk's mesh is on this new entity.
+    pub(crate) fn spawned(&mut self, key: ChunkKey, drawn: Drawn) {
+        self.table.spawned(key, drawn);
+        self.shown(key);
+    }
+
+    /// Takes a new mesh, and tells where it is to be shown.
+    pub(super) fn swap(&mut self, meshed: Meshed, look: u64) -> Swap {
+        let key = ChunkKey::finest(meshed.position);
+        self.has_shown = true;
+        Swap { key, place: self.table.meshed(key, &meshed.geometry, look), meshed, look }
+    }
+
+    /// What is shown of a chunk has changed.
+    fn shown(&mut self, key: ChunkKey) {
+        self.has_shown = true;
+        self.table.look_again(key);
+        self.may_drop_around(key);
+        self.renew_in_transition(key);
+        if self.table.drawn(key).is_some_and(|drawn| drawn.look != self.look.number) {
+            self.to_restyle.push(key);
+        }
+    }
+
+    fn lacks_samples(&self, key: ChunkKey) -> bool {
+        self.table.lacks_samples(key) && !matches!(self.table.shown(key), Some(super::table::Shown::Despawned))
+    }
+
+    /// Where a chunk's mesh is shown at the moment.
+    pub(crate) fn entity(&self, key: ChunkKey) -> Option<Entity> {
+        self.table.drawn(key).map(|drawn| drawn.entity)
+    }
+}
+
+/// Whether a chunk and all around it are certainly of one kind: that is asked without touching shared samples.
+pub(super) fn is_uniform_around(grid: &Grid<i16>, position: [i32; 3]) -> bool {
+    !matches!(grid.chunk(position), Some(Chunk::Samples(_))) && grid.neighbourhood_view(position).is_uniform()
+}

@@ -1,0 +1,292 @@
+//! Colours, normals and isovalue change.
+//!
+//! New colours and normals *sweep* over the chunks one by one, since borders stay closed meanwhile. Colours need no new
+//! geometry. Another isovalue moves the whole surface, so that all chunks are meshed beside what is drawn, and swapped in
+//! one update, the *transition*. A stamp meanwhile is shown at the former isovalue, and its chunks are meshed for the new
+//! one again. Settings that change before the transition is done wait for its end: so something is shown however
+//! often they change.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use bevy_platform::collections::HashSet;
+use marchless::{MeshBuffer, MeshSettings};
+
+use super::mesh::{Prepared, Shown, is_uniform_around};
+use super::{Colors, Group, Heart, Meshed, Purpose};
+use crate::chunk::ChunkKey;
+use crate::cover::UniqueQueue;
+use crate::jobs::{Ticket, new_number};
+
+/// How meshes look, apart from the isovalue.
+pub(super) struct Look {
+    /// Tells meshes that look otherwise.
+    pub(super) number: u64,
+    pub(super) normals: bool,
+    pub(super) colors: Colors,
+}
+
+impl Look {
+    pub(super) fn new(normals: bool, colors: Colors) -> Self {
+        Self { number: new_number(), normals, colors }
+    }
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { number: 0, normals: true, colors: Arc::new([[1.0; 4]; 256]) }
+    }
+}
+
+/// A change of the isovalue under way. Every leaf that is shown is waiting, lacking samples, being meshed, or meshed.
+pub(super) struct Transition {
+    isovalue: f32,
+    waiting: UniqueQueue,
+    /// Those whose surroundings are not filled.
+    lacking: HashSet<ChunkKey>,
+    /// Those that are being meshed, each with its job.
+    running: HashMap<ChunkKey, (u64, Ticket)>,
+    done: HashMap<ChunkKey, (Meshed, u64)>,
+}
+
+impl Transition {
+    pub(super) fn waiting(&self) -> usize {
+        self.waiting.len() + self.lacking.len() + self.running.len()
+    }
+}
+
+/// A chunk meshed at the isovalue to come.
+pub(crate) struct Restyled {
+    pub(crate) job: u64,
+    pub(crate) meshed: Meshed,
+    pub(crate) look: u64,
+}
+
+/// A chunk that is to look otherwise.
+pub(crate) enum Restyle {
+    /// It needs another mesh.
+    Mesh(Prepared),
+    /// Its geometry in other colours.
+    Recolor(ChunkKey, Group, Arc<MeshBuffer>),
+}
+
+impl Heart {
+    /// Changes whether meshes have normals, and their colours.
+    pub(crate) fn set_look(&mut self, normals: bool, colors: Colors) {
+        self.look = Look::new(normals, colors);
+        let Self { table, to_restyle, .. } = self;
+        table.entities().for_each(|(key, _)| to_restyle.push(key));
+    }
+
+    /// Whether chunks are to look otherwise, or a transition may go on.
+    pub(super) fn has_to_restyle(&self) -> bool {
+        !self.to_restyle.is_empty() || self.transition.is_some()
+    }
+
+    /// The next chunk that is to look otherwise; `None` where none is, or as many groups that give way are under way as
+    /// `limit` says. `assets`: whether there are meshes to be coloured.
+    pub(crate) fn next_restyle(&mut self, limit: usize, assets: bool) -> Option<Restyle> {
+        while self.groups.yielding() < limit {
+            let key = self.to_restyle.pop()?;
+            let Some(drawn) = self.table.drawn(key).filter(|drawn| drawn.look != self.look.number) else { continue };
+            if self.groups.is_pending(key) || self.groups.is_claimed(key) {
+                continue; // It is looked at again when it is shown.
+            }
+            let geometry = drawn.geometry.clone();
+            if geometry.is_empty() || geometry.normals.is_empty() != self.look.normals {
+                if geometry.is_empty() || !assets {
+                    self.table.set_look(key, self.look.number);
+                    continue;
+                }
+                let chunks = [key].into();
+                let group = Group {
+                    chunks,
+                    snapshot: Default::default(),
+                    look: self.look.number,
+                    since: None,
+                    purpose: Purpose::Restyle,
+                    members: 1,
+                    meshed: Vec::new(),
+                    tickets: Vec::new(),
+                };
+                return Some(Restyle::Recolor(key, group, geometry));
+            }
+            if let Some(prepared) = self.prepare_one(key, Purpose::Restyle) {
+                return Some(Restyle::Mesh(prepared));
+            }
+        }
+        None
+    }
+
+    /// Starts a group of one chunk with the job that colours its mesh.
+    pub(crate) fn start_recolor(&mut self, group: Group, start: impl FnOnce(u64) -> Ticket) {
+        let id = self.groups.start(group);
+        let ticket = start(id);
+        if let Some(group) = self.groups.get_mut(id) {
+            group.tickets.push(ticket);
+        }
+    }
+
+    /// Changes the isovalue: once all that is drawn has been meshed for it.
+    pub(crate) fn set_isovalue(&mut self, isovalue: f32) {
+        match &self.transition {
+            Some(transition) => self.next_isovalue = Some(isovalue).filter(|next| *next != transition.isovalue),
+            None if isovalue != self.isovalue => self.begin_transition(isovalue),
+            None => {}
+        }
+    }
+
+    fn begin_transition(&mut self, isovalue: f32) {
+        let mut waiting = UniqueQueue::default();
+        self.table.keys().filter(|key| self.table.is_shown(*key)).for_each(|key| waiting.push(key));
+        if waiting.is_empty() {
+            self.isovalue = isovalue;
+            // What is being meshed for the first time has the former one.
+            self.restart_groups();
+            return;
+        }
+        let (lacking, running, done) = (HashSet::default(), HashMap::new(), HashMap::new());
+        self.transition = Some(Transition { isovalue, waiting, lacking, running, done });
+    }
+
+    /// A chunk's samples, or what is shown of it, have changed: what was meshed for the isovalue to come is out of date.
+    pub(super) fn renew_in_transition(&mut self, key: ChunkKey) {
+        if let Some(transition) = &mut self.transition
+            && self.table.is_shown(key)
+        {
+            transition.running.remove(&key);
+            transition.done.remove(&key);
+            if !transition.lacking.contains(&key) {
+                transition.waiting.push(key);
+            }
+        }
+    }
+
+    /// A chunk is no longer drawn.
+    pub(super) fn leave_transition(&mut self, key: ChunkKey) {
+        if let Some(transition) = &mut self.transition {
+            transition.running.remove(&key);
+            transition.done.remove(&key);
+            transition.lacking.remove(&key);
+        }
+    }
+
+    /// Whether the transition waits for samples around a chunk.
+    pub(super) fn transition_lacks(&self, key: ChunkKey) -> bool {
+        self.transition.as_ref().is_some_and(|transition| transition.lacking.contains(&key))
+    }
+
+    /// Samples have come that the transition may have waited for.
+    pub(super) fn unblock_transition(&mut self, key: ChunkKey) {
+        if let Some(transition) = self.transition.as_mut().filter(|transition| !transition.lacking.is_empty()) {
+            for near in key.around().filter(|near| !self.table.lacks_samples(*near)) {
+                if transition.lacking.remove(&near) {
+                    transition.waiting.push(near);
+                }
+            }
+        }
+    }
+
+    /// The next chunk that is to be meshed for the isovalue to come, as long as no more than `limit` are: its job's number, and
+    /// how it is meshed.
+    pub(crate) fn next_in_transition(&mut self, limit: usize) -> Option<(ChunkKey, u64, MeshSettings)> {
+        let settings = self.mesh_settings();
+        loop {
+            let transition = self.transition.as_mut().filter(|transition| transition.running.len() < limit)?;
+            let key = transition.waiting.pop()?;
+            if !self.table.is_shown(key) || matches!(self.table.shown(key), Some(super::table::Shown::Despawned)) {
+                continue;
+            }
+            if self.table.lacks_samples(key) {
+                transition.lacking.insert(key);
+                self.look_at(key);
+            } else if is_uniform_around(self.samples.newest(), key.position) {
+                transition.done.insert(key, (Meshed::empty(key.position), self.look.number));
+            } else {
+                return Some((key, new_number(), MeshSettings { isovalue: transition.isovalue, ..settings }));
+            }
+        }
+    }
+
+    /// The number of the look that meshes get now.
+    pub(crate) const fn look(&self) -> u64 {
+        self.look.number
+    }
+
+    /// A chunk is being meshed for the isovalue to come.
+    pub(crate) fn started_in_transition(&mut self, key: ChunkKey, job: u64, ticket: Ticket) {
+        if let Some(transition) = &mut self.transition {
+            transition.running.insert(key, (job, ticket));
+        }
+    }
+
+    /// A chunk has been meshed for the isovalue to come.
+    pub(crate) fn take_restyled(&mut self, restyled: Restyled) {
+        let Restyled { job, meshed, look } = restyled;
+        let key = ChunkKey::finest(meshed.position);
+        if let Some(transition) = &mut self.transition
+            && transition.running.get(&key).is_some_and(|(number, _)| *number == job)
+        {
+            transition.running.remove(&key);
+            transition.done.insert(key, (meshed, look));
+        }
+    }
+
+    /// Whether no more than `inline` chunks are missing for the transition's end, all of which can be meshed now.
+    pub(crate) fn may_end_transition(&self, inline: usize) -> bool {
+        self.transition.as_ref().is_some_and(|transition| {
+            transition.running.is_empty() && transition.lacking.is_empty() && transition.waiting.len() <= inline
+        })
+    }
+
+    /// A chunk has been meshed at once for the isovalue to come.
+    pub(crate) fn meshed_in_transition(&mut self, meshed: Meshed) {
+        let look = self.look.number;
+        if let Some(transition) = &mut self.transition {
+            transition.done.insert(ChunkKey::finest(meshed.position), (meshed, look));
+        }
+    }
+
+    /// Shows all chunks at the new isovalue, if none is missing. They show the newest samples: what was to be meshed
+    /// at the former isovalue is among it.
+    pub(crate) fn end_transition(&mut self) -> Option<Shown> {
+        let is_done = |transition: &mut Transition| transition.waiting() == 0;
+        let Transition { isovalue, done, .. } = self.transition.take_if(is_done)?;
+        self.isovalue = isovalue;
+        let mut shown = Shown::default();
+        let groups = self.groups.take_all();
+        for (_, (meshed, look)) in done {
+            let key = ChunkKey::finest(meshed.position);
+            self.samples.show_newest(key.position);
+            shown.swaps.push(self.swap(meshed, look));
+            if look != self.look.number {
+                self.to_restyle.push(key);
+            }
+            self.may_drop_around(key);
+        }
+        for key in groups.iter().flat_map(|pending| &pending.chunks) {
+            for near in key.around().filter(|near| self.table.contains(*near)) {
+                self.samples.show_newest(near.position);
+            }
+            self.table.look_again(*key);
+            if self.table.drawn(*key).is_some_and(|drawn| drawn.look != self.look.number) {
+                self.to_restyle.push(*key);
+            }
+        }
+        shown.since = groups.into_iter().filter_map(|pending| pending.since).collect();
+        if let Some(next) = self.next_isovalue.take() {
+            self.set_isovalue(next);
+        }
+        Some(shown)
+    }
+
+    /// Has all groups start again, with settings that have changed.
+    fn restart_groups(&mut self) {
+        for pending in self.groups.take_all() {
+            pending.chunks.iter().for_each(|key| self.table.look_again(*key));
+            if pending.since.is_some() {
+                self.groups.add(pending);
+            }
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! [`Samples`]: a terrain's samples, the newest and those shown, and what stamps have changed of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use bevy_platform::collections::HashMap;
+use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, NeighbourhoodView, Region, SpareSamples, Stamp};
+
+use super::stamps::{Logged, StampLog};
+use crate::jobs::new_number;
+
+/// The samples of one terrain. Undo, saving and replication need no other part.
+///
+/// A chunk's samples are *resident* or not; those that are hold every stamp. Those that are not are had from the source, and
+/// the stamps that concern them applied again in order, by a [`Replay`].
+pub(crate) struct Samples {
+    /// Resident chunks, with every stamp.
+    newest: Grid<i16>,
+    /// As drawn, with those that chunks not drawn yet will have beside drawn ones.
+    shown: Grid<i16>,
+    log: StampLog,
+    /// Chunks that stamps have changed while they were resident.
+    edited: HashMap<[i32; 3], Edited>,
+    /// How many of them are held.
+    held: usize,
+    spare: SpareSamples,
+    /// Tells chunks sampled for an earlier source; 0 before the first.
+    generation: u64,
+}
+
+/// What is kept of a chunk's edits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Edited {
+    /// The stamps in the log: this many have changed it, and what those up to this number changed has been reported.
+    Stamps { changes: u32, reported: u64 },
+    /// Its samples, wherever viewers are.
+    Held,
+}
+
+/// When more stamps than this have changed a chunk, its samples stay instead: they take less memory.
+pub(super) const MOST_STAMPS: u32 = 64;
+
+/// The stamps that a chunk's samples lack that come from the source.
+pub(crate) struct Replay {
+    position: [i32; 3],
+    stamps: Vec<Logged>,
+    /// The number of the latest stamp of all.
+    through: u64,
+    reported: u64,
+    /// An empty grid with the terrain's border.
+    grid: Grid<i16>,
+}
+
+/// What a [`Replay`] has made.
+pub(crate) struct Replayed {
+    through: u64,
+    changes: u32,
+    /// What those have changed that had not been reported.
+    edit: Edit,
+}
+
+/// What one stamp has changed.
+pub(crate) struct Changed {
+    pub(crate) edit: Edit,
+    /// The chunks with changed samples.
+    pub(crate) chunks: Vec<[i32; 3]>,
+    /// The chunks whose meshes read changed samples.
+    pub(crate) affected: BTreeSet<[i32; 3]>,
+    /// Chunks that are not resident, and have so many stamps that their samples should be had and kept.
+    pub(crate) crowded: Vec<[i32; 3]>,
+}
+
+impl Default for Samples {
+    fn default() -> Self {
+        Self::new(Grid::new(DEFAULT_CHUNK_CELLS).expect("the default is within the limits"), 0)
+    }
+}
+
+impl Samples {
+    fn new(grid: Grid<i16>, generation: u64) -> Self {
+        Self {
+            shown: grid.clone(),
+            newest: grid,
+            log: StampLog::default(),
+            edited: HashMap::default(),
+            held: 0,
+            spare: SpareSamples::new(),
+            generation,
+        }
+    }
+
+    /// No samples yet, of a grid like this empty one.
+    pub(super) fn of(grid: Grid<i16>) -> Self {
+        Self::new(grid, new_number())
+    }
+
+    /// The newest samples.
+    pub(crate) const fn newest(&self) -> &Grid<i16> {
+        &self.newest
+    }
+
+    /// The samples as they are drawn.
+    pub(crate) const fn shown(&self) -> &Grid<i16> {
+        &self.shown
+    }
+
+    pub(crate) const fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    pub(super) fn is_resident(&self, position: [i32; 3]) -> bool {
+        self.newest.chunk(position).is_some()
+    }
+
+    /// Whether the samples stay wherever viewers are.
+    pub(super) fn is_held(&self, position: [i32; 3]) -> bool {
+        self.edited.get(&position) == Some(&Edited::Held)
+    }
+
+    /// Whether stamps concern a chunk that is not resident.
+    pub(super) fn needs_replay(&self, position: [i32; 3]) -> bool {
+        self.log.concerns(position, self.newest.chunk_region(position), 0)
+    }
+
+    /// The newest samples that meshing a chunk reads.
+    pub(crate) fn neighbourhood(&self, position: [i32; 3]) -> NeighbourhoodView<'_, i16> {
+        self.newest.neighbourhood_view(position)
+    }
+
+    /// Begins anew: all samples come from another source, and what was edited is gone. What is shown stays.
+    pub(super) fn refill(&mut self, empty: Grid<i16>) {
+        self.newest = empty;
+        self.edited.clear();
+        self.held = 0;
+        self.log.clear();
+        self.generation = new_number();
+    }
+
+    /// What a chunk's samples lack when they come from the source.
+    pub(super) fn replay(&self, position: [i32; 3], empty: Grid<i16>) -> Replay {
+        let reported = match self.edited.get(&position) {
+            Some(Edited::Stamps { reported, .. }) => *reported,
+            _ => 0,
+        };
+        let stamps = self.log.concerning(chunk_box(position), self.newest.chunk_region(position), 0);
+        Replay { position, stamps, through: self.log.last(), reported, grid: empty }
+    }
+
+    /// Takes in a chunk from the source, with the stamps that have been applied again; the rest are applied here.
+    /// Returns what has changed that had not been reported, and the chunks whose meshes read what the late stamps changed.
+    pub(super) fn load(
+        &mut self,
+        position: [i32; 3],
+        chunk: Chunk<i16>,
+        replayed: Option<Replayed>,
+    ) -> (Edit, BTreeSet<[i32; 3]>) {
+        self.newest.load(position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
+        let Replayed { through, changes, mut edit } = replayed.unwrap_or_else(Replayed::nothing);
+        let late = self.log.concerning(chunk_box(position), self.newest.chunk_region(position), through);
+        self.note_changes(position, changes, through, true);
+        for Logged { number, stamp, .. } in late {
+            edit.merge(&self.change(position, number, &stamp));
+        }
+        (edit, self.newest.take_dirty())
+    }
+
+    /// Gives up a chunk's samples, unless they stay.
+    pub(super) fn unload(&mut self, position: [i32; 3]) {
+        if !self.is_held(position) {
+            self.newest.unload(position);
+        }
+    }
+
+    /// Gives up the samples with which a chunk is drawn.
+    pub(super) fn unload_shown(&mut self, position: [i32; 3]) {
+        if let Some(samples) = self.shown.unload(position) {
+            self.spare.keep(samples);
+        }
+    }
+
+    /// Shows samples of a chunk.
+    pub(super) fn show(&mut self, position: [i32; 3], chunk: Chunk<i16>) {
+        if !self.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk)) {
+            self.unload_shown(position);
+            self.shown.load(position, chunk).expect("a chunk of the same extent");
+        }
+    }
+
+    /// Shows the newest samples of a chunk, where there are some.
+    pub(super) fn show_newest(&mut self, position: [i32; 3]) {
+        if let Some(chunk) = self.newest.chunk(position) {
+            self.show(position, chunk.clone());
+        }
+    }
+
+    /// Applies a stamp to all resident chunks, and keeps it for the others. `before`: gets the chunks that it changes, as
+    /// they were, unless they stand there already.
+    pub(super) fn stamp(&mut self, stamp: Stamp, before: &mut BTreeMap<[i32; 3], Chunk<i16>>) -> Changed {
+        let mut changed =
+            Changed { edit: Edit::NONE, chunks: Vec::new(), affected: BTreeSet::new(), crowded: Vec::new() };
+        let touched = stamp.region();
+        let Some(bounds) = self.newest.bounds().filter(|_| !touched.is_empty()) else { return changed };
+        let ends = [touched.min, touched.max.map(|v| v - 1)].map(|end| self.newest.chunk_of(end));
+        let region = Region::new(ends[0], ends[1].map(|v| v + 1)).intersection(&bounds);
+        if region.is_empty() {
+            return changed;
+        }
+        let (number, stamp) = (self.log.next(), Arc::new(stamp));
+        for position in self.resident_in(region) {
+            // A clone is made for the first change only: while it lives, the samples are copied to be changed.
+            let is_first = !before.contains_key(&position);
+            let was = self.newest.chunk(position).filter(|_| is_first).cloned();
+            let edit = self.change(position, number, &stamp);
+            if !edit.is_empty() {
+                before.extend(was.map(|was| (position, was)));
+                changed.chunks.push(position);
+                changed.edit.merge(&edit);
+            }
+        }
+        changed.affected = self.newest.take_dirty();
+        let may_be_held = self.held > 0 && count(region) <= u64::from(MOST_STAMPS);
+        let held = if may_be_held { region.points().filter(|position| self.is_held(*position)).count() } else { 0 };
+        let at_node = self.log.insert(number, stamp, region, held as u32);
+        if at_node > MOST_STAMPS as usize {
+            changed.crowded = region.points().filter(|position| self.is_crowded(*position)).collect();
+        }
+        changed
+    }
+
+    /// Whether a chunk is not resident and has so many stamps that its samples take less.
+    fn is_crowded(&self, position: [i32; 3]) -> bool {
+        let stamps = || self.log.concerning(chunk_box(position), self.newest.chunk_region(position), 0).len();
+        !self.is_resident(position) && stamps() > MOST_STAMPS as usize
+    }
+
+    /// The resident chunks in a region, in order.
+    fn resident_in(&self, region: Region) -> Vec<[i32; 3]> {
+        self.newest.chunks_in(region).map(|(position, _)| position).collect()
+    }
+
+    /// Applies a stamp to a resident chunk.
+    fn change(&mut self, position: [i32; 3], number: u64, stamp: &Stamp) -> Edit {
+        let edit = self.newest.apply_to_chunk(position, stamp, &mut self.spare);
+        self.note_changes(position, u32::from(!edit.is_empty()), number, false);
+        edit
+    }
+
+    /// Notes that stamps up to a number have changed a chunk this many times; `afresh`: in all.
+    fn note_changes(&mut self, position: [i32; 3], changes: u32, through: u64, afresh: bool) {
+        if changes == 0 {
+            return;
+        }
+        let edited = self.edited.entry(position).or_insert(Edited::Stamps { changes: 0, reported: 0 });
+        if let Edited::Stamps { changes: before, reported } = edited {
+            *before = if afresh { changes } else { *before + changes };
+            *reported = (*reported).max(through);
+            if *before > MOST_STAMPS {
+                *edited = Edited::Held;
+                self.held += 1;
+                self.log.release(position, self.newest.chunk_region(position));
+            }
+        }
+    }
+}
+
+impl Replay {
+    /// Applies the stamps to what the source gave, as the terrain's own samples would have taken them.
+    pub(crate) fn run(mut self, chunk: Chunk<i16>) -> (Chunk<i16>, Replayed) {
+        let mut replayed = Replayed { through: self.through, ..Replayed::nothing() };
+        if self.stamps.is_empty() || self.grid.load(self.position, chunk.clone()).is_err() {
+            return (chunk, replayed);
+        }
+        for Logged { number, stamp, .. } in &self.stamps {
+            let edit = self.grid.apply_to_chunk(self.position, stamp, &mut SpareSamples::new());
+            replayed.changes += u32::from(!edit.is_empty());
+            if *number > self.reported {
+                replayed.edit.merge(&edit);
+            }
+        }
+        (self.grid.unload(self.position).unwrap_or(chunk), replayed)
+    }
+}
+
+impl Replayed {
+    const fn nothing() -> Self {
+        Self { through: 0, changes: 0, edit: Edit::NONE }
+    }
+}
+
+/// The box of one chunk.
+fn chunk_box(position: [i32; 3]) -> Region {
+    Region::new(position, position.map(|v| v.saturating_add(1)))
+}
+
+fn count(region: Region) -> u64 {
+    region.size().into_iter().map(u64::from).fold(1, u64::saturating_mul)
+}
+
+/// Whether two chunks are known to be the same without looking at their samples.
+pub(crate) fn same_samples(a: &Chunk<i16>, b: &Chunk<i16>) -> bool {
+    match (a, b) {
+        (Chunk::Uniform(a), Chunk::Uniform(b)) => a == b,
+        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
+        _ => false,
+    }
+}

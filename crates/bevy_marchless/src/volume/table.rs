@@ -1,0 +1,470 @@
+//! [`ChunkTable`]: every loaded chunk of a terrain, and how far it is.
+
+mod entry;
+
+use core::mem;
+use std::sync::Arc;
+
+use bevy_ecs::entity::Entity;
+use bevy_platform::collections::HashMap;
+use marchless::{MeshBuffer, Region};
+
+pub(crate) use entry::{Counts, Drawn, Shown};
+use entry::{Entry, Fill, Role};
+
+use super::Signs;
+use crate::chunk::ChunkKey;
+use crate::cover::{LeafState, UniqueQueue, Wanted};
+use crate::jobs::Ticket;
+
+/// Every loaded chunk of a terrain. Each event is one function; all counts are kept here.
+///
+/// A chunk *can be drawn* once its own samples and those of all chunks around it are resident, as far as there are any.
+#[derive(Default)]
+pub(crate) struct ChunkTable {
+    chunks: HashMap<ChunkKey, Entry>,
+    /// Chunks that can be drawn, and of which what is shown is not up to date; each once, some stale.
+    ready: UniqueQueue,
+    counts: Counts,
+    /// Entities that nothing is shown on any more.
+    released: Vec<Entity>,
+    /// Whether nobody makes meshes: then chunks wait for none.
+    without_meshes: bool,
+}
+
+/// What a chunk takes in the table.
+pub(in crate::volume) const ENTRY_BYTES: usize = size_of::<(ChunkKey, Entry)>();
+
+/// What became of a job that samples, when its chunk was let go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unloaded {
+    /// There was none.
+    Nothing,
+    /// It has been withdrawn.
+    Job,
+    /// The samples are there.
+    Samples,
+}
+
+/// Where to show a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// Nowhere: there is nothing to show, or nobody wants it any more.
+    Nowhere,
+    /// On its entity.
+    On(Entity),
+    /// On its entity, whose geometry stays as it is.
+    Recolored(Entity),
+    /// On a new entity.
+    New,
+}
+
+impl ChunkTable {
+    /// Says whether somebody makes meshes.
+    pub(super) fn set_meshing(&mut self, meshing: bool) {
+        if self.without_meshes == meshing {
+            self.without_meshes = !meshing;
+            let all: Vec<ChunkKey> = self.chunks.keys().copied().collect();
+            all.into_iter().for_each(|key| self.change(key, |_| {}));
+        }
+    }
+
+    /// Whether somebody makes meshes.
+    pub(super) const fn makes_meshes(&self) -> bool {
+        !self.without_meshes
+    }
+
+    pub(crate) const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.chunks.len()
+    }
+
+    pub(crate) fn keys(&self) -> impl Iterator<Item = ChunkKey> + '_ {
+        self.chunks.keys().copied()
+    }
+
+    pub(crate) fn contains(&self, key: ChunkKey) -> bool {
+        self.chunks.contains_key(&key)
+    }
+
+    /// What there is of a chunk, as the cover sees it: a leaf that has not been drawn is no more than its samples.
+    pub(super) fn kept(&self, key: ChunkKey) -> Wanted {
+        match self.chunks.get(&key) {
+            None => Wanted::Gone,
+            Some(Entry { role: Role::Leaf { shown, .. }, .. }) if !matches!(shown, Shown::Nothing) => Wanted::Mesh,
+            Some(_) => Wanted::Samples,
+        }
+    }
+
+    pub(super) fn is_leaf(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| matches!(entry.role, Role::Leaf { .. }))
+    }
+
+    /// What is shown of a leaf.
+    pub(super) fn shown(&self, key: ChunkKey) -> Option<&Shown> {
+        match &self.chunks.get(&key)?.role {
+            Role::Support => None,
+            Role::Leaf { shown, .. } => Some(shown),
+        }
+    }
+
+    /// The mesh of a chunk, and its entity.
+    pub(crate) fn drawn(&self, key: ChunkKey) -> Option<&Drawn> {
+        match self.shown(key)? {
+            Shown::Mesh(drawn) => Some(drawn),
+            _ => None,
+        }
+    }
+
+    pub(super) fn leaf_state(&self, key: ChunkKey) -> Option<LeafState> {
+        self.shown(key).map(Shown::state)
+    }
+
+    /// Whether something is shown of a chunk, if only that it is empty.
+    pub(super) fn is_shown(&self, key: ChunkKey) -> bool {
+        self.shown(key).is_some_and(|shown| !matches!(shown, Shown::Nothing))
+    }
+
+    /// Whether a chunk has its samples.
+    pub(super) fn is_filled(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(Entry::is_filled)
+    }
+
+    /// Whether a chunk is to be filled.
+    pub(super) fn is_queued(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Queued))
+    }
+
+    /// Whether nobody has seen to a chunk's samples.
+    pub(super) fn is_unasked(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Unasked))
+    }
+
+    pub(super) fn is_dropped(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Dropped))
+    }
+
+    /// Whether a chunk waits for the result of this job.
+    pub(super) fn is_asked(&self, key: ChunkKey, job: u64) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(number, _) if number == job))
+    }
+
+    /// Whether a leaf's samples, or some around it, are missing.
+    pub(super) fn lacks_samples(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| entry.missing > 0)
+    }
+
+    /// Whether a chunk is a leaf that can be drawn.
+    pub(super) fn can_be_drawn(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(Entry::can_be_drawn)
+    }
+
+    /// Whether a chunk can be drawn, and what is shown is not up to date.
+    pub(super) fn is_ready(&self, key: ChunkKey) -> bool {
+        !self.without_meshes && self.chunks.get(&key).is_some_and(Entry::is_ready)
+    }
+
+    /// Whether a leaf waits for samples around it.
+    pub(super) fn waits_for_samples(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| match &entry.role {
+            Role::Leaf { shown, is_stale } => entry.missing > 0 && (*is_stale || matches!(shown, Shown::Nothing)),
+            Role::Support => false,
+        })
+    }
+
+    /// Whether what is shown of a chunk is up to date, as far as is known without looking at groups.
+    pub(super) fn is_current(&self, key: ChunkKey) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| match &entry.role {
+            Role::Leaf { shown, is_stale } => !is_stale && !matches!(shown, Shown::Nothing),
+            Role::Support => false,
+        })
+    }
+
+    /// Whether a chunk is known to have no surface at an isovalue.
+    pub(super) fn is_without_surface(&self, key: ChunkKey, isovalue: f32) -> bool {
+        let signs = |key: ChunkKey| self.chunks.get(&key).map(|entry| entry.signs.at(isovalue));
+        let ChunkKey { level, position } = key;
+        signs(key).is_some_and(|own| {
+            own.are_without_surface(|step| {
+                let position = [0, 1, 2].map(|axis| position[axis].saturating_add(step[axis]));
+                signs(ChunkKey { level, position })
+            })
+        })
+    }
+
+    /// The next of the chunks that can be drawn and are not up to date.
+    pub(super) fn next_ready(&mut self) -> Option<ChunkKey> {
+        while let Some(key) = self.ready.pop() {
+            if self.is_ready(key) {
+                return Some(key);
+            }
+        }
+        None
+    }
+
+    pub(crate) fn ready_len(&self) -> usize {
+        self.ready.len()
+    }
+
+    /// Entities to be despawned: nothing is shown on them any more.
+    pub(crate) fn take_released(&mut self) -> Vec<Entity> {
+        mem::take(&mut self.released)
+    }
+
+    pub(crate) fn released_len(&self) -> usize {
+        self.released.len()
+    }
+
+    /// All entities that something is shown on.
+    pub(crate) fn entities(&self) -> impl Iterator<Item = (ChunkKey, Entity)> + '_ {
+        self.chunks.keys().filter_map(|key| Some((*key, self.drawn(*key)?.entity)))
+    }
+
+    /// A chunk came into range. `extent`: the chunks that there are.
+    pub(super) fn load(&mut self, key: ChunkKey, wanted: Wanted, extent: Region) {
+        let is_missing = |near: &ChunkKey| extent.contains(near.position) && !self.is_filled(*near);
+        let missing = key.around().filter(is_missing).count() as u8;
+        let role = if wanted == Wanted::Mesh { Role::NEW_LEAF } else { Role::Support };
+        let entry = Entry { role, fill: Fill::Unasked, signs: Signs::UNKNOWN, missing, is_outdated: false };
+        self.counts.add(&entry);
+        if let Some(former) = self.chunks.insert(key, entry) {
+            debug_assert!(false, "{key:?} was loaded already");
+            self.counts.take(&former);
+        }
+    }
+
+    /// A chunk that had samples only is to be drawn.
+    pub(super) fn promote(&mut self, key: ChunkKey) {
+        self.change(key, |entry| {
+            if matches!(entry.role, Role::Support) {
+                entry.role = Role::NEW_LEAF;
+            }
+        });
+    }
+
+    /// A leaf is to be drawn no longer, and stays for its neighbours.
+    pub(super) fn demote(&mut self, key: ChunkKey) {
+        if let Some(drawn) = self.drawn(key) {
+            self.released.push(drawn.entity);
+        }
+        self.change(key, |entry| {
+            entry.role = Role::Support;
+            entry.is_outdated &= !entry.is_filled();
+        });
+    }
+
+    /// A chunk went out of range.
+    pub(super) fn unload(&mut self, key: ChunkKey) -> Unloaded {
+        self.demote(key);
+        let Some(entry) = self.chunks.remove(&key) else { return Unloaded::Nothing };
+        self.counts.take(&entry);
+        match entry.fill {
+            Fill::Unasked | Fill::Queued | Fill::Dropped => Unloaded::Nothing,
+            Fill::Asked(..) => Unloaded::Job,
+            Fill::Resident => {
+                self.samples_lost(key);
+                Unloaded::Samples
+            }
+        }
+    }
+
+    /// A chunk's samples take a job, which waits for its turn.
+    pub(super) fn queue(&mut self, key: ChunkKey) {
+        self.change(key, |entry| entry.fill = Fill::Queued);
+    }
+
+    /// The job that samples a chunk has been asked for.
+    pub(super) fn ask(&mut self, key: ChunkKey, job: u64, ticket: Ticket) {
+        self.change(key, |entry| entry.fill = Fill::Asked(job, ticket));
+    }
+
+    /// A chunk's samples are there. `signs`: where they are known.
+    pub(super) fn samples_arrived(&mut self, key: ChunkKey, signs: Option<Signs>) {
+        let was_filled = self.is_filled(key);
+        self.change(key, |entry| {
+            entry.fill = Fill::Resident;
+            entry.signs = signs.unwrap_or(entry.signs);
+            entry.is_outdated &= matches!(&entry.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned));
+        });
+        if !was_filled && self.contains(key) {
+            for near in key.around() {
+                let Some(entry) = self.chunks.get_mut(&near) else { continue };
+                entry.missing -= 1;
+                if entry.missing == 0 {
+                    self.look_again(near);
+                }
+            }
+        }
+    }
+
+    /// Stamps have changed a chunk's samples.
+    pub(super) fn samples_changed(&mut self, key: ChunkKey) {
+        if let Some(entry) = self.chunks.get_mut(&key) {
+            entry.signs = Signs::UNKNOWN;
+        }
+    }
+
+    /// A chunk's samples have been dropped; they can be had again.
+    pub(super) fn samples_dropped(&mut self, key: ChunkKey) {
+        if self.is_filled(key) {
+            self.change(key, |entry| entry.fill = Fill::Dropped);
+            self.samples_lost(key);
+        }
+    }
+
+    /// Dropped samples are wanted again. Returns whether they had been dropped.
+    pub(super) fn revive(&mut self, key: ChunkKey) -> bool {
+        let is_dropped = self.is_dropped(key);
+        if is_dropped {
+            self.change(key, |entry| entry.fill = Fill::Unasked);
+        }
+        is_dropped
+    }
+
+    /// What is shown of a leaf is older than its samples, and it is drawn anew as soon as it can be.
+    pub(super) fn set_stale(&mut self, key: ChunkKey) {
+        self.change(key, |entry| {
+            if let Role::Leaf { shown: Shown::Empty | Shown::Mesh(_), is_stale } = &mut entry.role {
+                *is_stale = true;
+            }
+        });
+    }
+
+    /// A chunk may be ready after all: looks again.
+    pub(super) fn look_again(&mut self, key: ChunkKey) {
+        self.change(key, |_| {});
+    }
+
+    /// A chunk is known to have nothing to draw. Returns whether it has nothing on the screen either; else nothing changes.
+    pub(super) fn set_empty(&mut self, key: ChunkKey) -> bool {
+        let mut is_empty = false;
+        self.change(key, |entry| {
+            let Role::Leaf { shown, is_stale } = &mut entry.role else { return };
+            is_empty = shown.state() != LeafState::Drawn;
+            if is_empty {
+                (*is_stale, entry.is_outdated) = (false, false);
+                if matches!(shown, Shown::Nothing) {
+                    *shown = Shown::Empty;
+                }
+            }
+        });
+        is_empty
+    }
+
+    /// A chunk's mesh has the look of this number, though its geometry is what it was.
+    pub(super) fn set_look(&mut self, key: ChunkKey, look: u64) {
+        self.change(key, |entry| {
+            if let Role::Leaf { shown: Shown::Mesh(drawn), .. } = &mut entry.role {
+                drawn.look = look;
+            }
+        });
+    }
+
+    /// A chunk has been meshed, and is to be shown so. Returns where; for a new entity, [`spawned`](Self::spawned) follows.
+    pub(super) fn meshed(&mut self, key: ChunkKey, geometry: &Arc<MeshBuffer>, look: u64) -> Place {
+        let mut place = Place::Nowhere;
+        self.change(key, |entry| {
+            let Role::Leaf { shown, is_stale } = &mut entry.role else { return };
+            if let Shown::Mesh(drawn) = shown
+                && Arc::ptr_eq(&drawn.geometry, geometry)
+            {
+                // Its colours are other ones, but it is as old as it was.
+                drawn.look = look;
+                place = Place::Recolored(drawn.entity);
+                return;
+            }
+            (*is_stale, entry.is_outdated) = (false, false);
+            match shown {
+                Shown::Despawned => {}
+                Shown::Nothing | Shown::Empty if geometry.is_empty() => *shown = Shown::Empty,
+                Shown::Nothing | Shown::Empty => place = Place::New,
+                Shown::Mesh(drawn) => {
+                    if !(drawn.geometry.is_empty() && geometry.is_empty()) {
+                        place = Place::On(drawn.entity);
+                        drawn.geometry = geometry.clone();
+                    }
+                    drawn.look = look;
+                }
+            }
+        });
+        place
+    }
+
+    /// A chunk's mesh is on this new entity.
+    pub(super) fn spawned(&mut self, key: ChunkKey, drawn: Drawn) {
+        self.change(key, |entry| {
+            if let Role::Leaf { shown, .. } = &mut entry.role {
+                *shown = Shown::Mesh(drawn);
+            }
+        });
+    }
+
+    /// The game has despawned a chunk's entity.
+    pub(super) fn despawned(&mut self, key: ChunkKey, entity: Entity) {
+        if self.drawn(key).is_some_and(|drawn| drawn.entity == entity) {
+            self.change(key, |entry| {
+                entry.role = Role::Leaf { shown: Shown::Despawned, is_stale: false };
+                entry.is_outdated &= !entry.is_filled();
+            });
+        }
+    }
+
+    /// All samples are to be had anew. What is shown stays until then.
+    pub(super) fn refill(&mut self, extent: Region) {
+        let inner = Region::new(extent.min.map(|v| v.saturating_add(1)), extent.max.map(|v| v.saturating_sub(1)));
+        self.ready = UniqueQueue::default();
+        self.counts = Counts::default();
+        for (key, entry) in &mut self.chunks {
+            entry.fill = Fill::Unasked;
+            entry.signs = Signs::UNKNOWN;
+            entry.missing = if inner.contains(key.position) {
+                27
+            } else {
+                key.around().filter(|near| extent.contains(near.position)).count() as u8
+            };
+            if let Role::Leaf { shown, is_stale } = &mut entry.role {
+                *is_stale = matches!(shown, Shown::Empty | Shown::Mesh(_));
+            }
+            entry.is_outdated = true;
+            self.counts.add(entry);
+        }
+    }
+
+    /// A chunk has its samples no longer: those around it cannot be drawn anew.
+    fn samples_lost(&mut self, key: ChunkKey) {
+        for near in key.around() {
+            if let Some(entry) = self.chunks.get_mut(&near) {
+                entry.missing += 1;
+            }
+        }
+    }
+
+    /// Every change that counts goes through here: it keeps the counts and finds what becomes ready.
+    fn change(&mut self, key: ChunkKey, change: impl FnOnce(&mut Entry)) {
+        let Some(entry) = self.chunks.get_mut(&key) else { return };
+        self.counts.take(entry);
+        change(entry);
+        if self.without_meshes && entry.can_be_drawn() {
+            entry.is_outdated = false;
+        }
+        self.counts.add(entry);
+        if !self.without_meshes && entry.is_ready() {
+            self.ready.push(key);
+        }
+    }
+
+    /// All that holds of any table.
+    #[cfg(test)]
+    pub(super) fn check(&self, extent: Region) {
+        let mut counts = Counts::default();
+        for (key, entry) in &self.chunks {
+            counts.add(entry);
+            let missing = key.around().filter(|near| extent.contains(near.position) && !self.is_filled(*near)).count();
+            assert_eq!(usize::from(entry.missing), missing, "{key:?}");
+        }
+        assert_eq!(self.counts, counts);
+    }
+}

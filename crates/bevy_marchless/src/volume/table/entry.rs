@@ -1,0 +1,138 @@
+//! [`Entry`]: one loaded chunk, in states that make sense, and [`Counts`] of them.
+
+use std::sync::Arc;
+
+use bevy_ecs::entity::Entity;
+use marchless::MeshBuffer;
+
+use crate::cover::LeafState;
+use crate::jobs::Ticket;
+use crate::volume::Signs;
+
+/// How many chunks of each kind there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Chunks that wait for their samples.
+    pub(crate) unfilled: usize,
+    /// Leaves that have not been drawn.
+    pub(crate) waiting: usize,
+    /// Leaves without anything to draw.
+    pub(crate) empty: usize,
+    /// Leaves with a mesh.
+    pub(crate) drawn: usize,
+    /// Chunks of an earlier source that are to be filled and shown anew.
+    pub(crate) outdated: usize,
+}
+
+/// One loaded chunk.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) role: Role,
+    pub(super) fill: Fill,
+    pub(super) signs: Signs,
+    /// How many chunks of its 3 × 3 × 3 surroundings, itself included, are not filled.
+    pub(super) missing: u8,
+    pub(super) is_outdated: bool,
+}
+
+/// What a chunk is loaded for.
+#[derive(Debug)]
+pub(super) enum Role {
+    /// Its samples alone, for the meshes of its neighbours.
+    Support,
+    /// To be drawn. Stale: what is shown is older than the samples, because some around it were missing.
+    Leaf { shown: Shown, is_stale: bool },
+}
+
+/// What is shown of a leaf.
+#[derive(Clone, Debug)]
+pub(crate) enum Shown {
+    /// Nothing yet.
+    Nothing,
+    /// There is nothing to draw, and never was.
+    Empty,
+    /// A mesh on an entity; an empty one, where all was dug away.
+    Mesh(Drawn),
+    /// The game has despawned its entity: it is drawn no more.
+    Despawned,
+}
+
+/// A mesh on an entity.
+#[derive(Clone, Debug)]
+pub(crate) struct Drawn {
+    pub(crate) entity: Entity,
+    pub(crate) geometry: Arc<MeshBuffer>,
+    /// The number of the look that it has.
+    pub(crate) look: u64,
+}
+
+/// How far the samples of a chunk are.
+#[derive(Debug)]
+pub(super) enum Fill {
+    /// Nobody has asked for them yet.
+    Unasked,
+    /// They take a job, which waits for its turn.
+    Queued,
+    /// The job that samples, by its number.
+    Asked(u64, #[expect(dead_code, reason = "dropping it withdraws the job")] Ticket),
+    /// They are there.
+    Resident,
+    /// They were there, and have been dropped.
+    Dropped,
+}
+
+impl Role {
+    pub(super) const NEW_LEAF: Self = Self::Leaf { shown: Shown::Nothing, is_stale: false };
+}
+
+impl Shown {
+    pub(super) fn state(&self) -> LeafState {
+        match self {
+            Self::Nothing => LeafState::Waiting,
+            Self::Empty | Self::Despawned => LeafState::Empty,
+            Self::Mesh(drawn) if drawn.geometry.is_empty() => LeafState::Empty,
+            Self::Mesh(_) => LeafState::Drawn,
+        }
+    }
+}
+
+impl Entry {
+    pub(super) const fn is_filled(&self) -> bool {
+        matches!(self.fill, Fill::Resident)
+    }
+
+    pub(super) const fn can_be_drawn(&self) -> bool {
+        self.missing == 0 && matches!(&self.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned))
+    }
+
+    pub(super) const fn is_ready(&self) -> bool {
+        match &self.role {
+            Role::Leaf { shown, is_stale } => self.can_be_drawn() && (*is_stale || matches!(shown, Shown::Nothing)),
+            Role::Support => false,
+        }
+    }
+}
+
+impl Counts {
+    pub(super) fn add(&mut self, entry: &Entry) {
+        self.each(entry, |count, more| *count += more);
+    }
+
+    pub(super) fn take(&mut self, entry: &Entry) {
+        self.each(entry, |count, less| *count -= less);
+    }
+
+    fn each(&mut self, entry: &Entry, change: impl Fn(&mut usize, usize)) {
+        let is_unfilled = matches!(entry.fill, Fill::Unasked | Fill::Queued | Fill::Asked(..));
+        change(&mut self.unfilled, is_unfilled.into());
+        change(&mut self.outdated, entry.is_outdated.into());
+        if let Role::Leaf { shown, .. } = &entry.role {
+            let count = match shown.state() {
+                LeafState::Waiting => &mut self.waiting,
+                LeafState::Empty => &mut self.empty,
+                LeafState::Drawn => &mut self.drawn,
+            };
+            change(count, 1);
+        }
+    }
+}

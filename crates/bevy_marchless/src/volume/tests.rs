@@ -1,0 +1,378 @@
+//! Random events, until nothing waits: no app, no window, no entity but a number.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use bevy_ecs::entity::Entity;
+use bevy_platform::time::Instant;
+use marchless::{
+    BrushShape, Grid, MeshBuffer, MeshSettings, Mesher, NeighbourhoodView, Operation, Region, SpareSamples, Stamp,
+};
+use proptest::prelude::*;
+
+use super::*;
+use crate::cover::{Range, View};
+use crate::jobs::{Priority, WorkQueue, do_next};
+use crate::stats::TerrainStats;
+
+const CELLS: u32 = 8;
+const EXTENT: Region = Region { min: [-4, -3, -4], max: [5, 3, 4] };
+
+/// What happens to a terrain. Lengths in chunks.
+#[derive(Clone, Debug)]
+enum Event {
+    View { viewer: u32, view: Option<([f64; 3], f64, f64, Option<f64>)> },
+    Stamp { center: [f64; 3], radius: f64, add: bool },
+    Despawn { index: usize },
+    Source { shift: f64 },
+    Colors,
+    Normals,
+    Isovalue { isovalue: f32 },
+    Update { jobs: usize, inline: usize, late: bool },
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    let place = || (-3.0..4.0f64, -1.5..1.5f64, -3.0..4.0f64).prop_map(|(x, y, z)| [x, y, z]);
+    let view = (place(), 0.2..2.4f64, 0.0..1.2f64, prop::option::of(0.0..1.5f64));
+    prop_oneof![
+        4 => (0u32..3, prop::option::weighted(0.8, view)).prop_map(|(viewer, view)| Event::View { viewer, view }),
+        6 => (place(), 0.1..1.5f64, any::<bool>())
+            .prop_map(|(center, radius, add)| Event::Stamp { center, radius, add }),
+        1 => (0usize..100).prop_map(|index| Event::Despawn { index }),
+        1 => (-4.0..4.0f64).prop_map(|shift| Event::Source { shift }),
+        1 => Just(Event::Colors),
+        1 => Just(Event::Normals),
+        1 => (-1.5f32..1.5).prop_map(|isovalue| Event::Isovalue { isovalue }),
+        12 => (0usize..30, prop_oneof![Just(0usize), Just(8)], any::<bool>())
+            .prop_map(|(jobs, inline, late)| Event::Update { jobs, inline, late }),
+    ]
+}
+
+/// A terrain with all that is around it in a game.
+struct Game {
+    heart: Heart,
+    queue: WorkQueue,
+    stats: TerrainStats,
+    /// What is on the screen.
+    screen: HashMap<Entity, (ChunkKey, Arc<MeshBuffer>)>,
+    despawned: Vec<ChunkKey>,
+    next_entity: u32,
+    /// The stamps since the source began, and those that wait.
+    stamps: Vec<Stamp>,
+    waiting: Vec<Stamp>,
+    recipe: Recipe,
+    normals: bool,
+    isovalue: f32,
+}
+
+fn recipe(shift: f64) -> Recipe {
+    let hills = move |[x, y, z]: [f64; 3]| y - shift - 3.0 * (x * 0.2).sin() * (z * 0.15).cos();
+    Recipe { source: Arc::new(hills), extent: EXTENT, cells: CELLS, spacing: 1.0 }
+}
+
+fn colors() -> Colors {
+    Arc::new([[0.5; 4]; 256])
+}
+
+impl Game {
+    fn new() -> Self {
+        let recipe = recipe(0.0);
+        Self {
+            heart: Heart::new(recipe.clone(), 0.0, true, colors(), true),
+            queue: WorkQueue::default(),
+            stats: TerrainStats::default(),
+            screen: HashMap::new(),
+            despawned: Vec::new(),
+            next_entity: 1,
+            stamps: Vec::new(),
+            waiting: Vec::new(),
+            recipe,
+            normals: true,
+            isovalue: 0.0,
+        }
+    }
+
+    fn happen(&mut self, event: &Event) {
+        match *event {
+            Event::View { viewer, view } => {
+                let view = view.map(|(middle, radius, margin, samples)| {
+                    let range = Range::ellipsoid(middle, [radius; 3], EXTENT);
+                    let samples = samples.map(|samples| Range::ellipsoid(middle, [samples + 0.1; 3], EXTENT));
+                    View::new(range, margin, samples, [1.0, 0.0, 0.0])
+                });
+                self.heart.set_view(Entity::from_raw_u32(viewer), view);
+            }
+            Event::Stamp { center, radius, add } => {
+                let scale = f64::from(CELLS);
+                let shape = BrushShape::sphere(center.map(|v| v * scale), radius * scale).expect("in range");
+                let operation = if add { Operation::Add } else { Operation::Dig };
+                self.waiting.push(Stamp::new(shape, operation, 3));
+            }
+            Event::Despawn { index } => {
+                let mut all: Vec<_> = self.screen.iter().map(|(entity, (key, _))| (*key, *entity)).collect();
+                all.sort();
+                if let Some((key, entity)) = all.get(index % all.len().max(1)) {
+                    self.screen.remove(entity);
+                    self.heart.despawned(*key, *entity);
+                    self.despawned.push(*key);
+                }
+            }
+            Event::Source { shift } => {
+                if self.heart.is_generation_shown() {
+                    self.recipe = recipe(shift);
+                    self.heart.refill(self.recipe.clone(), self.isovalue);
+                    self.stamps.clear();
+                    self.waiting.clear();
+                }
+            }
+            Event::Colors => self.heart.set_look(self.normals, colors()),
+            Event::Normals => {
+                self.normals = !self.normals;
+                self.heart.set_look(self.normals, colors());
+            }
+            Event::Isovalue { isovalue } => {
+                self.isovalue = isovalue;
+                self.heart.set_isovalue(isovalue);
+            }
+            Event::Update { jobs, inline, late } => self.update(jobs, inline, late),
+        }
+    }
+
+    /// What the systems do in an update. `late`: there is no time.
+    fn update(&mut self, jobs: usize, inline: usize, late: bool) {
+        let now = Instant::now();
+        let until = if late { now } else { now + Duration::from_millis(5) };
+        self.heart.follow(until, &mut self.stats);
+        for entity in self.heart.take_released() {
+            assert!(self.screen.remove(&entity).is_some(), "released twice, or never shown");
+        }
+        self.heart.take_filled(1, until, |_| {});
+        let results = self.heart.filled().clone();
+        self.heart.ask_for_samples(16, |job| {
+            let results = results.clone();
+            self.queue.push(Priority::Fill(job.urgency), move || results.push(job.run()))
+        });
+        self.apply_stamps();
+        self.mesh(inline, until);
+        (0..jobs).for_each(|_| _ = do_next(&self.queue));
+        self.check();
+    }
+
+    fn apply_stamps(&mut self) {
+        let mut edits = Edits::default();
+        while let Some(stamp) = self.waiting.first().copied() {
+            if !self.heart.has_samples_for(stamp.region()) {
+                break;
+            }
+            self.waiting.remove(0);
+            self.stamps.push(stamp);
+            self.heart.stamp(stamp, self.stats.now(), &mut edits);
+        }
+        self.heart.set_holds_stamps(!self.waiting.is_empty());
+        let _ = (self.heart.take_late_edits(), self.heart.finish_edits(edits));
+    }
+
+    fn mesh(&mut self, inline: usize, until: Instant) {
+        while let Some(group) = self.heart.take_meshed(|| Instant::now() < until, |_| {}) {
+            let shown = self.heart.show(group);
+            self.show(shown);
+        }
+        while let Some(prepared) = self.heart.next_changed() {
+            if prepared.to_mesh.len() <= inline {
+                self.show_now(prepared);
+            } else {
+                self.start(prepared, Priority::Edit);
+            }
+        }
+        self.heart.sort_ready(until);
+        while let Some((prepared, urgency)) = self.heart.next_first_mesh(8) {
+            self.start(prepared, Priority::FirstMesh(urgency));
+        }
+        while let Some(restyle) = self.heart.next_restyle(8, true) {
+            match restyle {
+                Restyle::Mesh(prepared) => self.start(prepared, Priority::Restyle),
+                Restyle::Recolor(key, group, geometry) => {
+                    let results = self.heart.meshed().clone();
+                    self.heart.start_recolor(group, |id| {
+                        self.queue.push(Priority::Restyle, move || {
+                            let meshed = Meshed { geometry, ..Meshed::empty(key.position) };
+                            results.push(MeshResult::OfGroup(id, meshed));
+                        })
+                    });
+                }
+            }
+        }
+        if self.heart.may_end_transition(inline) {
+            while let Some((key, _, settings)) = self.heart.next_in_transition(usize::MAX) {
+                let meshed = meshed(&self.heart.samples().neighbourhood(key.position), key.position, &settings);
+                self.heart.meshed_in_transition(meshed);
+            }
+            let shown = self.heart.end_transition();
+            shown.into_iter().for_each(|shown| self.show(shown));
+        }
+        while let Some((key, job, settings)) = self.heart.next_in_transition(8) {
+            let samples = self.heart.samples().neighbourhood(key.position).to_neighbourhood();
+            let (results, look) = (self.heart.meshed().clone(), self.heart.look());
+            let ticket = self.queue.push(Priority::Restyle, move || {
+                let meshed = meshed(&samples.view(), key.position, &settings);
+                results.push(MeshResult::Restyled(Restyled { job, meshed, look }));
+            });
+            self.heart.started_in_transition(key, job, ticket);
+        }
+    }
+
+    fn show_now(&mut self, prepared: Prepared) {
+        let Prepared { mut group, to_mesh } = prepared;
+        let settings = self.heart.mesh_settings();
+        for position in to_mesh {
+            group.push(meshed(&self.heart.samples().neighbourhood(position), position, &settings));
+        }
+        let shown = self.heart.show(group);
+        self.show(shown);
+    }
+
+    fn start(&mut self, prepared: Prepared, priority: Priority) {
+        if prepared.to_mesh.is_empty() {
+            return self.show_now(prepared);
+        }
+        let (results, settings) = (self.heart.meshed().clone(), self.heart.mesh_settings());
+        self.heart.start(prepared, |heart, id, position| {
+            let samples = heart.samples().neighbourhood(position).to_neighbourhood();
+            let results = results.clone();
+            self.queue.push(priority, move || {
+                results.push(MeshResult::OfGroup(id, meshed(&samples.view(), position, &settings)));
+            })
+        });
+    }
+
+    fn show(&mut self, shown: Shown) {
+        for Swap { key, place, meshed, look } in shown.swaps {
+            match place {
+                Place::Nowhere => {}
+                Place::On(entity) => {
+                    let on_screen = self.screen.get_mut(&entity).expect("it is on the screen");
+                    assert_eq!(on_screen.0, key);
+                    on_screen.1 = meshed.geometry;
+                }
+                Place::Recolored(entity) => {
+                    assert!(Arc::ptr_eq(&self.screen[&entity].1, &meshed.geometry), "the same geometry");
+                }
+                Place::New => {
+                    let entity = Entity::from_raw_u32(self.next_entity).expect("few entities");
+                    self.next_entity += 1;
+                    self.screen.insert(entity, (key, meshed.geometry.clone()));
+                    self.heart.spawned(key, Drawn { entity, geometry: meshed.geometry, look });
+                }
+            }
+        }
+    }
+
+    /// What holds in every update.
+    fn check(&self) {
+        let heart = &self.heart;
+        heart.table.check(EXTENT);
+        heart.groups.check();
+        let drawn: HashMap<_, _> = heart.table.entities().map(|(key, entity)| (entity, key)).collect();
+        assert_eq!(drawn.len(), self.screen.len(), "what is drawn is on the screen");
+        for (entity, key) in drawn {
+            let (on_screen, geometry) = &self.screen[&entity];
+            assert_eq!(*on_screen, key);
+            assert!(Arc::ptr_eq(geometry, &heart.table.drawn(key).expect("it is drawn").geometry));
+        }
+        for position in EXTENT.points() {
+            let key = ChunkKey::finest(position);
+            let (filled, resident) = (heart.table.is_filled(key), heart.samples.is_resident(position));
+            let may_be_resident = filled || heart.samples.is_held(position);
+            assert!(resident == filled || resident && may_be_resident, "{position:?}: {filled}, {resident}");
+        }
+        for queue in [heart.arriving.len(), heart.to_fill.len(), heart.to_mesh.len()] {
+            assert!(queue <= 2 * EXTENT.points().count());
+        }
+    }
+
+    /// Updates until nothing waits; then everything is as if it had always been so.
+    fn settle(&mut self) {
+        for _ in 0..2_000 {
+            self.update(30, 8, false);
+            if self.heart.is_settled() && self.waiting.is_empty() {
+                return self.check_settled();
+            }
+        }
+        panic!("not settled: {:?}, {:?}", self.heart.coverage(), self.heart.table.counts());
+    }
+
+    fn check_settled(&self) {
+        let heart = &self.heart;
+        assert_eq!(heart.coverage().waiting, 0);
+        assert_eq!(heart.isovalue(), self.isovalue);
+        assert!(heart.is_generation_shown() && heart.sampling == 0 && heart.groups.is_empty());
+        let mut fresh = Grid::<i16>::bounded(CELLS, EXTENT).expect("a good extent");
+        for position in EXTENT.points() {
+            let source = self.recipe.source.as_ref();
+            fresh.load(position, Chunk::from_source(source, position, CELLS, 1.0)).expect("a chunk of it");
+            for stamp in &self.stamps {
+                fresh.apply_to_chunk(position, stamp, &mut SpareSamples::new());
+            }
+        }
+        let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
+        for position in EXTENT.points() {
+            let key = ChunkKey::finest(position);
+            if let Some(chunk) = heart.samples().newest().chunk(position) {
+                let expected = fresh.chunk(position).expect("all are there");
+                let is_same = (0..CELLS.pow(3) as usize).all(|index| chunk.voxel(index) == expected.voxel(index));
+                assert!(is_same, "samples of {position:?}");
+            }
+            let state = heart.leaf_at(position).map(|leaf| leaf.state);
+            assert!(state.is_some() || !heart.cover.contains(position), "{position:?} is in range");
+            assert_eq!(state.is_some(), heart.table.is_leaf(key));
+            let is_despawned = self.despawned.contains(&key) && heart.entity(key).is_none();
+            if let Some(state) = state.filter(|_| !is_despawned) {
+                let expected = meshed(&fresh.neighbourhood_view(position), position, &settings).geometry;
+                let wanted = if expected.is_empty() { LeafState::Empty } else { LeafState::Drawn };
+                assert_eq!(state, wanted, "{position:?}");
+                if let Some(drawn) = heart.table.drawn(key).filter(|drawn| !drawn.geometry.is_empty()) {
+                    assert!(*drawn.geometry == *expected, "the mesh of {position:?}");
+                    assert_eq!(drawn.look, heart.look(), "the look of {position:?}");
+                }
+            }
+        }
+    }
+}
+
+fn meshed(samples: &NeighbourhoodView<'_, i16>, position: [i32; 3], settings: &MeshSettings) -> Meshed {
+    let mut geometry = MeshBuffer::new();
+    let mut block = marchless::Block::new();
+    samples.mesh(&mut Mesher::new(), &mut block, settings, &mut geometry).expect("samples of a chunk");
+    Meshed { geometry: Arc::new(geometry), ..Meshed::empty(position) }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn whatever_happens_nothing_waits_for_ever(events in prop::collection::vec(event(), 1..60)) {
+        let mut game = Game::new();
+        for event in &events {
+            game.happen(event);
+        }
+        game.settle();
+        // And again, from there.
+        for event in events.iter().rev() {
+            game.happen(event);
+        }
+        game.settle();
+    }
+
+    #[test]
+    fn each_queue_holds_a_chunk_once(turns in prop::collection::vec((0.0..6.2f64, any::<bool>()), 1..200)) {
+        let mut game = Game::new();
+        for (angle, here) in turns {
+            let x = if here { -3.0 } else { 3.5 };
+            let view = Some(([x + 0.3 * angle.cos(), 0.0, 0.3 * angle.sin()], 1.5, 0.5, Some(0.5)));
+            game.happen(&Event::View { viewer: 1, view });
+            game.happen(&Event::Stamp { center: [x, 0.0, 0.0], radius: 0.5, add: here });
+            game.update(0, 0, true);
+        }
+        game.settle();
+    }
+}
