@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use crate::brush::TerrainEdited;
 use crate::mesh::ChunkSamples;
-use crate::terrain::TerrainVolume;
+use crate::terrain::{TerrainVolume, give_to_terrains};
 use cache::BitsCache;
 use part::{Ground, Part, parts, within};
 pub use piece::Piece;
@@ -64,7 +64,7 @@ pub struct BitsPlugin;
 
 impl Plugin for BitsPlugin {
     fn build(&self, app: &mut App) {
-        app.register_required_components::<TerrainVolume, BitsCache>();
+        give_to_terrains::<BitsCache>(app);
     }
 }
 

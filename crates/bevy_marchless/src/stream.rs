@@ -32,7 +32,7 @@ use bevy_transform::components::Transform;
 
 pub use crate::cover::{Coverage, Leaf, LeafState};
 use crate::schedule::Phase;
-use crate::terrain::TerrainVolume;
+use crate::terrain::give_to_terrains;
 
 /// Loads terrains around viewers, fills them from their sources, and unloads them.
 #[derive(Default)]
@@ -41,7 +41,7 @@ pub struct StreamPlugin;
 impl Plugin for StreamPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<TerrainViewer>();
-        app.register_required_components::<TerrainVolume, follow::Followed>();
+        give_to_terrains::<follow::Followed>(app);
         app.add_systems(PostUpdate, follow::follow_viewers.in_set(Phase::Follow))
             .add_systems(PostUpdate, (fill::take_filled_chunks, fill::ask_for_samples).chain().in_set(Phase::Fill));
     }

@@ -363,6 +363,18 @@ impl Default for Palette {
     }
 }
 
+/// Gives all terrains a component of the plugin's, those that are there already, too.
+pub(crate) fn give_to_terrains<C: Component + Default>(app: &mut App) {
+    let world = app.world_mut();
+    let there: Vec<Entity> = world.query_filtered::<Entity, With<TerrainVolume>>().iter(world).collect();
+    for terrain in there {
+        world.entity_mut(terrain).insert(C::default());
+    }
+    app.add_observer(|added: On<Add, TerrainVolume>, mut commands: Commands| {
+        commands.entity(added.entity).try_insert_if_new(C::default());
+    });
+}
+
 /// Keeps terrains' volumes, and follows their settings.
 #[derive(Default)]
 pub struct TerrainPlugin;

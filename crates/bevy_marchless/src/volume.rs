@@ -175,9 +175,12 @@ impl Heart {
         table.keys().for_each(|key| arriving.add(key, cover));
     }
 
-    /// Whether all chunks that were there when the present source began have been shown with it, so that the next may begin.
+    /// Whether all chunks that were there when the present source began have been shown with it, and some chunk if there is
+    /// any, so that the next may begin.
     pub(crate) fn is_generation_shown(&self) -> bool {
-        self.table.counts().outdated == 0 && (self.has_shown || self.is_settled())
+        let counts = self.table.counts();
+        let may_show = self.table.makes_meshes() && counts.waiting + counts.empty + counts.drawn > 0;
+        counts.outdated == 0 && (self.has_shown || !may_show)
     }
 
     pub(crate) const fn samples(&self) -> &Samples {

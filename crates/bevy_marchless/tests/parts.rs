@@ -56,3 +56,12 @@ fn terrain_without_brushes_is_drawn() {
     let terrain = settled(&mut app, ball());
     assert_drawn(&mut app, terrain);
 }
+
+#[test]
+fn a_terrain_may_be_there_before_the_plugin() {
+    let mut app = App::new();
+    let terrain = app.world_mut().spawn(ball()).id();
+    app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, MarchlessPlugins));
+    settle(&mut app, terrain);
+    assert_drawn(&mut app, terrain);
+}

@@ -34,7 +34,7 @@ impl Heart {
         let despawning = |heart: &Self| heart.table.released_len() as u32 * ENTITY_TIME;
         let mut done = 0;
         while (done < LEAST || Instant::now() + despawning(self) < until_gone)
-            && let Some(key) = self.leaving.pop()
+            && let Some(key) = self.next_leaving()
         {
             self.settle(key, stats);
             done += 1;
@@ -87,6 +87,17 @@ impl Heart {
     /// The game has despawned a chunk's entity. Its samples stay: its neighbours' meshes need them.
     pub(crate) fn despawned(&mut self, key: ChunkKey, entity: bevy_ecs::entity::Entity) {
         self.table.despawned(key, entity);
+    }
+
+    /// The next chunk of which less may be wanted. Those that are not loaded are passed over, a number of them at once.
+    fn next_leaving(&mut self) -> Option<ChunkKey> {
+        for _ in 0..256 {
+            let key = self.leaving.pop()?;
+            if self.table.contains(key) {
+                return Some(key);
+            }
+        }
+        None
     }
 
     fn next_arriving(&mut self) -> Option<ChunkKey> {
