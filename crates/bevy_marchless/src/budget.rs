@@ -60,7 +60,7 @@ impl FrameBudget {
     /// Until when a system that has begun at `start` may go on with a kind of work.
     pub(crate) fn until(&self, start: Instant, share: Share) -> Instant {
         let part = share.of(self.limit);
-        let part = if self.yields && share != Share::Mesh { part / HELD_BACK } else { part };
+        let part = if self.yields { part / HELD_BACK } else { part };
         let left = part.saturating_sub(self.spent);
         start.checked_add(left).unwrap_or_else(|| start + Duration::from_secs(3_600))
     }
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(shares(false), [4, 6, 8]);
         (0..EVERY).for_each(|_| assert_eq!(shares(false), [4, 6, 8]));
         for _ in 0..3 {
-            assert_eq!(shares(true), [1, 1, 8]);
+            assert_eq!(shares(true), [1, 1, 2]);
             (1..EVERY).for_each(|_| assert_eq!(shares(true), [4, 6, 8]));
         }
     }
