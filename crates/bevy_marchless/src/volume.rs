@@ -67,6 +67,8 @@ pub(crate) struct Heart {
     table: ChunkTable,
     groups: Groups,
     cover: Cover,
+    /// Whether some viewer has moved since chunks last followed.
+    has_moved: bool,
     /// New viewers, whose chunks are still to be listed.
     unlisted: VecDeque<ViewId>,
     /// Chunks of which more may be wanted, and of which less.
@@ -115,6 +117,7 @@ impl Default for Heart {
             table: ChunkTable::default(),
             groups: Groups::default(),
             cover: Cover::default(),
+            has_moved: false,
             unlisted: VecDeque::new(),
             arriving: ChunkQueue::default(),
             leaving: UniqueQueue::default(),
@@ -286,11 +289,12 @@ impl Heart {
 
     /// Changes what a viewer sees; `None`: it is gone.
     pub(crate) fn set_view(&mut self, id: ViewId, view: Option<crate::cover::View>) {
-        let Self { cover, arriving, leaving, to_fill, to_mesh, unlisted, .. } = self;
+        let Self { cover, arriving, leaving, to_fill, to_mesh, unlisted, has_moved, .. } = self;
         let old = cover.view(id).copied();
         if old == view {
             return;
         }
+        *has_moved = true;
         match (old, view) {
             (None, Some(_)) => unlisted.push_back(id),
             (Some(_), None) => unlisted.retain(|other| *other != id),

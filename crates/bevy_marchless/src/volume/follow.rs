@@ -46,7 +46,8 @@ impl Heart {
             self.settle(key, stats);
             done += 1;
         }
-        if self.has_lost_leaves() {
+        // That goes through all chunks: not while viewers move.
+        if !core::mem::take(&mut self.has_moved) && self.has_lost_leaves() {
             self.give_up_lost_leaves();
         }
         if self.is_filled() && self.transition.is_none() {
