@@ -1,5 +1,6 @@
 //! [`Chunk`] and [`ChunkGeometry`]: the entities that mirror what is drawn of a terrain, its children.
 
+use core::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use bevy_camera::primitives::Aabb;
@@ -8,7 +9,7 @@ use bevy_ecs::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{MeshBuffer, Region};
+use marchless::MeshBuffer;
 
 /// One chunk of a terrain, on an entity of its own, a child of the terrain.
 ///
@@ -28,10 +29,20 @@ pub struct Chunk {
 }
 
 /// Which chunk of which level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ChunkKey {
     pub(crate) level: u8,
     pub(crate) position: [i32; 3],
+}
+
+impl Hash for ChunkKey {
+    /// Two words: keys are looked up in every update, and parts of a byte or four take hashers as long as a word.
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let [x, y, z] = self.position.map(|v| u64::from(v.cast_unsigned()));
+        state.write_u64(x | y << 32);
+        state.write_u64(z | u64::from(self.level) << 32);
+    }
 }
 
 impl ChunkKey {
@@ -42,9 +53,12 @@ impl ChunkKey {
 
     /// The 3 × 3 × 3 chunks around it, itself included, of the same level.
     pub(crate) fn around(self) -> impl Iterator<Item = Self> {
-        let Self { level, position } = self;
-        let region = Region::new(position.map(|v| v.saturating_sub(1)), position.map(|v| v.saturating_add(2)));
-        region.points().map(move |position| Self { level, position })
+        let Self { level, position: [x, y, z] } = self;
+        let near = |v: i32, step: i32| v.saturating_add(step - 1);
+        (0..27).map(move |index| Self {
+            level,
+            position: [near(x, index % 3), near(y, index / 3 % 3), near(z, index / 9)],
+        })
     }
 }
 

@@ -86,8 +86,14 @@ impl Cover {
     }
 
     /// Changes what one viewer sees; `None`: it is gone. `come` is told the chunks that may now be wanted more than
-    /// before, `go` those that may be wanted less; some of them twice.
-    pub(crate) fn set(&mut self, id: ViewId, view: Option<View>, come: impl FnMut([i32; 3]), go: impl FnMut([i32; 3])) {
+    /// before, and how much of them, `go` those that may be wanted less; some of them twice.
+    pub(crate) fn set(
+        &mut self,
+        id: ViewId,
+        view: Option<View>,
+        come: impl FnMut([i32; 3], Wanted),
+        go: impl FnMut([i32; 3]),
+    ) {
         let old = match view {
             Some(view) => self.views.insert(id, view),
             None => self.views.remove(&id),
@@ -106,7 +112,7 @@ impl Cover {
     }
 
     /// All chunks of which a viewer may want more than nothing.
-    pub(crate) fn list(&self, id: ViewId, come: impl FnMut([i32; 3])) {
+    pub(crate) fn list(&self, id: ViewId, come: impl FnMut([i32; 3], Wanted)) {
         if let Some(borders) = self.borders.get(&id) {
             borders.come(&Borders::default(), come);
         }
@@ -204,17 +210,17 @@ mod tests {
                 let id = Entity::from_raw_u32(viewer);
                 let before = cover.clone();
                 let (mut come, mut gone) = (BTreeSet::new(), BTreeSet::new());
-                cover.set(id, view, |position| { come.insert(position); }, |position| { gone.insert(position); });
+                cover.set(id, view, |position, wanted| { come.insert((position, wanted)); }, |position| { gone.insert(position); });
                 for position in EXTENT.grown(2, 2).points() {
                     for now in [Wanted::Gone, Wanted::Samples, Wanted::Mesh] {
                         let wanted = cover.wanted(position, now);
                         if before.wanted(position, now) == now && wanted != now {
-                            let found = if wanted > now { &come } else { &gone };
-                            prop_assert!(found.contains(&position), "{:?} as {:?}", position, now);
+                            let is_told = if wanted > now { come.contains(&(position, wanted)) } else { gone.contains(&position) };
+                            prop_assert!(is_told, "{:?}: {:?}, not {:?}", position, wanted, now);
                         }
                     }
                     if !before.wants_samples(position) && cover.wants_samples(position) {
-                        prop_assert!(come.contains(&position), "samples of {:?} are wanted again", position);
+                        prop_assert!(come.contains(&(position, Wanted::Samples)), "samples of {:?} are wanted again", position);
                     }
                     if !before.may_drop_samples(position) && cover.may_drop_samples(position) {
                         prop_assert!(gone.contains(&position), "samples of {:?} may be dropped", position);
@@ -226,7 +232,7 @@ mod tests {
         #[test]
         fn bounds_hold_all_that_a_view_asks_for(view in view()) {
             let mut cover = Cover::default();
-            cover.set(None, Some(view), |_| {}, |_| {});
+            cover.set(None, Some(view), |_, _| {}, |_| {});
             for position in EXTENT.grown(3, 3).points() {
                 let asks = view.with_margin().grown(1.0).contains(position)
                     || view.samples.is_some_and(|range| range.widened(view.margin).grown(0.0).contains(position));

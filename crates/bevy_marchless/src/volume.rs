@@ -114,7 +114,7 @@ impl Default for Heart {
         Self {
             recipe: None,
             samples: Samples::default(),
-            table: ChunkTable::default(),
+            table: ChunkTable::new(Region::new([0; 3], [0; 3]), true),
             groups: Groups::default(),
             cover: Cover::default(),
             has_moved: false,
@@ -147,22 +147,21 @@ impl Default for Heart {
 impl Heart {
     /// A terrain of which nothing is loaded yet. `meshing`: whether somebody makes meshes.
     pub(crate) fn new(recipe: Recipe, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
-        let mut heart = Self {
+        Self {
             samples: Samples::of(recipe.empty_grid()),
+            table: ChunkTable::new(recipe.extent, meshing),
             recipe: Some(recipe),
             isovalue,
             look: Look::new(normals, colors),
             ..Self::default()
-        };
-        heart.table.set_meshing(meshing);
-        heart
+        }
     }
 
     /// Has all samples come from another source: what was edited is gone, and what is drawn stays until each chunk's new
     /// mesh is there. The chunks are where they were.
     pub(crate) fn refill(&mut self, recipe: Recipe, isovalue: f32) {
         self.samples.refill(recipe.empty_grid());
-        self.table.refill(recipe.extent);
+        self.table.refill();
         self.groups.take_all();
         self.to_fill.clear();
         self.to_mesh.clear();
@@ -242,7 +241,7 @@ impl Heart {
         let is_coming = |key: &ChunkKey| !self.table.is_leaf(*key) && self.cover.contains(key.position);
         let mut coming: HashSet<ChunkKey> = self.arriving.iter().filter(is_coming).collect();
         for id in &self.unlisted {
-            let listed = |position| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming));
+            let listed = |position, _| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming));
             self.cover.list(*id, listed);
         }
         Coverage { waiting: counts.waiting + coming.len(), empty: counts.empty, drawn: counts.drawn }
@@ -289,7 +288,7 @@ impl Heart {
 
     /// Changes what a viewer sees; `None`: it is gone.
     pub(crate) fn set_view(&mut self, id: ViewId, view: Option<crate::cover::View>) {
-        let Self { cover, arriving, leaving, to_fill, to_mesh, unlisted, has_moved, .. } = self;
+        let Self { cover, table, arriving, leaving, to_fill, to_mesh, unlisted, has_moved, .. } = self;
         let old = cover.view(id).copied();
         if old == view {
             return;
@@ -302,15 +301,22 @@ impl Heart {
         }
         // All chunks of a new viewer take time to list: one viewer after the other.
         let is_listed = !unlisted.contains(&id);
+        let keeps_samples = !cover.drops_samples() && view.is_none_or(|view| view.samples.is_none());
         cover.set(
             id,
             view,
-            |position| {
-                if is_listed {
-                    arriving.add_unsorted(ChunkKey::finest(position), id);
+            |position, wanted| {
+                let key = ChunkKey::finest(position);
+                if is_listed && !(keeps_samples && table.has_all(key, wanted)) {
+                    arriving.add_unsorted(key, id);
                 }
             },
-            |position| leaving.push(ChunkKey::finest(position)),
+            |position| {
+                let key = ChunkKey::finest(position);
+                if table.contains(key) {
+                    leaving.push(key);
+                }
+            },
         );
         for queue in [arriving, to_fill, to_mesh] {
             match (old, view) {

@@ -2,7 +2,7 @@
 
 use core::cmp::Reverse;
 use core::ops::Bound;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, VecDeque, btree_map::Entry};
 
 use bevy_platform::collections::HashSet;
 
@@ -124,16 +124,17 @@ impl ChunkQueue {
             return None;
         }
         let Self { agendas, members, last, .. } = self;
-        let behind = (Bound::Excluded(*last), Bound::Unbounded);
-        let turns: Vec<ViewId> = agendas.range(behind).chain(agendas.range(..=*last)).map(|(id, _)| *id).collect();
-        for id in turns {
-            let Some(agenda) = agendas.get_mut(&id) else { continue };
-            if let Some(key) = agenda.pop(cover.view(id), members, &waits) {
-                *last = id;
-                return Some(key);
+        loop {
+            let behind = (Bound::Excluded(*last), Bound::Unbounded);
+            let id = agendas.range(behind).map(|(id, _)| *id).next().or_else(|| agendas.keys().next().copied())?;
+            *last = id;
+            let Entry::Occupied(mut agenda) = agendas.entry(id) else { return None };
+            let key = agenda.get_mut().pop(cover.view(id), members, &waits);
+            if key.is_some() {
+                return key;
             }
+            agenda.remove();
         }
-        None
     }
 }
 
@@ -242,7 +243,7 @@ mod tests {
     fn cover(views: &[(ViewId, View)]) -> Cover {
         let mut cover = Cover::default();
         for (id, view) in views {
-            cover.set(*id, Some(*view), |_| {}, |_| {});
+            cover.set(*id, Some(*view), |_, _| {}, |_| {});
         }
         cover
     }
@@ -294,7 +295,7 @@ mod tests {
             for (position, owner) in &positions {
                 queue.add_unsorted(ChunkKey::finest(*position), ids[*owner as usize]);
             }
-            cover.set(ids[1], None, |_| {}, |_| {});
+            cover.set(ids[1], None, |_, _| {}, |_| {});
             queue.remove_view(ids[1], &cover);
             let found: Vec<_> =
                 core::iter::from_fn(|| queue.pop(&cover, |_| true)).map(|key| key.position).collect();

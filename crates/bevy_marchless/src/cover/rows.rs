@@ -2,7 +2,7 @@
 
 use core::ops;
 
-use super::View;
+use super::{View, Wanted};
 
 /// Chunks in rows along x.
 #[derive(Clone, Debug, Default)]
@@ -92,9 +92,10 @@ impl Borders {
         }
     }
 
-    /// The chunks of which more may be wanted than with `old` borders.
-    pub(super) fn come(&self, old: &Self, mut take: impl FnMut([i32; 3])) {
-        self.drawn.difference(&old.drawn, Some(&old.around), &mut take);
+    /// The chunks of which more may be wanted than with `old` borders, and how much.
+    pub(super) fn come(&self, old: &Self, mut take: impl FnMut([i32; 3], Wanted)) {
+        self.drawn.difference(&old.drawn, None, &mut |position| take(position, Wanted::Mesh));
+        let mut take = |position| take(position, Wanted::Samples);
         self.around.difference(&old.around, None, &mut take);
         if self.samples.is_some() || old.samples.is_some() {
             self.samples_wanted().difference(old.samples_wanted(), None, &mut take);

@@ -145,12 +145,11 @@ impl Heart {
 
     /// Fills a loaded chunk at once where that needs no job.
     pub(super) fn fill(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
-        let Some(recipe) = self.recipe.clone() else { return };
         if self.samples.is_resident(key.position) {
             self.table.samples_arrived(key, None);
             self.filled_around(key);
         } else if !self.samples.needs_replay(key.position)
-            && let Some(chunk) = self.bound(&recipe, key.position)
+            && let Some(chunk) = self.bound(key.position)
         {
             stats.bounded += 1;
             let signs = Signs::of(&chunk, self.isovalue);
@@ -208,7 +207,8 @@ impl Heart {
     }
 
     /// What the source is certain of without sampling.
-    fn bound(&mut self, Recipe { source, cells, spacing, .. }: &Recipe, position: [i32; 3]) -> Option<Chunk<i16>> {
+    fn bound(&mut self, position: [i32; 3]) -> Option<Chunk<i16>> {
+        let Recipe { source, cells, spacing, .. } = self.recipe.as_ref()?;
         if self.bounds.len() > MOST_BOXES {
             self.bounds.clear();
         }

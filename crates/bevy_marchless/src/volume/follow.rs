@@ -34,7 +34,7 @@ impl Heart {
         let despawning = |heart: &Self| heart.table.released_len() as u32 * ENTITY_TIME;
         let mut done = 0;
         while (done < LEAST || Instant::now() + despawning(self) < until_gone)
-            && let Some(key) = self.next_leaving()
+            && let Some(key) = self.leaving.pop()
         {
             self.settle(key, stats);
             done += 1;
@@ -78,7 +78,7 @@ impl Heart {
     fn list_viewers(&mut self, until: Instant) {
         while let Some(id) = self.unlisted.pop_front() {
             let Self { cover, arriving, .. } = self;
-            cover.list(id, |position| arriving.add_unsorted(ChunkKey::finest(position), id));
+            cover.list(id, |position, _| arriving.add_unsorted(ChunkKey::finest(position), id));
             if Instant::now() >= until {
                 break;
             }
@@ -88,17 +88,6 @@ impl Heart {
     /// The game has despawned a chunk's entity. Its samples stay: its neighbours' meshes need them.
     pub(crate) fn despawned(&mut self, key: ChunkKey, entity: bevy_ecs::entity::Entity) {
         self.table.despawned(key, entity);
-    }
-
-    /// The next chunk of which less may be wanted. Those that are not loaded are passed over, a number of them at once.
-    fn next_leaving(&mut self) -> Option<ChunkKey> {
-        for _ in 0..256 {
-            let key = self.leaving.pop()?;
-            if self.table.contains(key) {
-                return Some(key);
-            }
-        }
-        None
     }
 
     fn next_arriving(&mut self) -> Option<ChunkKey> {
@@ -112,7 +101,7 @@ impl Heart {
         let wanted = self.cover.wanted(key.position, self.table.kept(key));
         match (self.table.contains(key), wanted) {
             (false, Wanted::Gone) => return,
-            (false, _) => self.load(key, wanted, extent, stats),
+            (false, _) => self.load(key, wanted, stats),
             (true, Wanted::Gone) => return self.unload(key, stats),
             (true, Wanted::Samples) => self.hide(key),
             (true, Wanted::Mesh) if self.table.is_leaf(key) => self.load_lost_neighbours(key, extent, stats),
@@ -126,8 +115,8 @@ impl Heart {
         }
     }
 
-    fn load(&mut self, key: ChunkKey, wanted: Wanted, extent: Region, stats: &mut TerrainStats) {
-        self.table.load(key, wanted, extent);
+    fn load(&mut self, key: ChunkKey, wanted: Wanted, stats: &mut TerrainStats) {
+        self.table.load(key, wanted);
         stats.loaded += 1;
     }
 
@@ -140,7 +129,7 @@ impl Heart {
         for near in key.around().filter(|near| extent.contains(near.position)) {
             let wanted = self.cover.wanted(near.position, Wanted::Samples);
             if wanted > Wanted::Gone && !self.table.contains(near) {
-                self.load(near, wanted, extent, stats);
+                self.load(near, wanted, stats);
                 self.fill(near, stats);
             }
         }

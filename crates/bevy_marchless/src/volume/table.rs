@@ -1,6 +1,7 @@
 //! [`ChunkTable`]: every loaded chunk of a terrain, and how far it is.
 
 mod entry;
+mod filled;
 
 use core::mem;
 use std::sync::Arc;
@@ -11,6 +12,7 @@ use marchless::{MeshBuffer, Region};
 
 pub(crate) use entry::{Counts, Drawn, Shown};
 use entry::{Entry, Fill, Role};
+use filled::FilledChunks;
 
 use super::Signs;
 use crate::chunk::ChunkKey;
@@ -20,16 +22,19 @@ use crate::jobs::Ticket;
 /// Every loaded chunk of a terrain. Each event is one function; all counts are kept here.
 ///
 /// A chunk *can be drawn* once its own samples and those of all chunks around it are resident, as far as there are any.
-#[derive(Default)]
 pub(crate) struct ChunkTable {
+    /// The chunks that there are.
+    extent: Region,
+    /// Whether somebody makes meshes; else chunks wait for none.
+    makes_meshes: bool,
     chunks: HashMap<ChunkKey, Entry>,
+    /// Those of them whose samples are resident.
+    filled: FilledChunks,
     /// Chunks that can be drawn, and of which what is shown is not up to date; each once, some stale.
     ready: UniqueQueue,
     counts: Counts,
     /// Entities that nothing is shown on any more.
     released: Vec<Entity>,
-    /// Whether nobody makes meshes: then chunks wait for none.
-    without_meshes: bool,
 }
 
 /// What a chunk takes in the table.
@@ -60,18 +65,22 @@ pub(crate) enum Place {
 }
 
 impl ChunkTable {
-    /// Says whether somebody makes meshes.
-    pub(super) fn set_meshing(&mut self, meshing: bool) {
-        if self.without_meshes == meshing {
-            self.without_meshes = !meshing;
-            let all: Vec<ChunkKey> = self.chunks.keys().copied().collect();
-            all.into_iter().for_each(|key| self.change(key, |_| {}));
+    /// An empty table. `extent`: the chunks that there are. `makes_meshes`: whether somebody makes meshes.
+    pub(super) fn new(extent: Region, makes_meshes: bool) -> Self {
+        Self {
+            extent,
+            makes_meshes,
+            chunks: HashMap::default(),
+            filled: FilledChunks::default(),
+            ready: UniqueQueue::default(),
+            counts: Counts::default(),
+            released: Vec::new(),
         }
     }
 
     /// Whether somebody makes meshes.
     pub(super) const fn makes_meshes(&self) -> bool {
-        !self.without_meshes
+        self.makes_meshes
     }
 
     pub(crate) const fn counts(&self) -> Counts {
@@ -152,26 +161,36 @@ impl ChunkTable {
         self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(number, _) if number == job))
     }
 
-    /// Whether a leaf's samples, or some around it, are missing.
+    /// Whether samples of a chunk, or some around it, are missing.
     pub(super) fn lacks_samples(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| entry.missing > 0)
+        self.contains(key) && !self.is_surrounded(key)
     }
 
     /// Whether a chunk is a leaf that can be drawn.
     pub(super) fn can_be_drawn(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(Entry::can_be_drawn)
+        self.chunks.get(&key).is_some_and(Entry::may_be_drawn) && self.is_surrounded(key)
     }
 
     /// Whether a chunk can be drawn, and what is shown is not up to date.
     pub(super) fn is_ready(&self, key: ChunkKey) -> bool {
-        !self.without_meshes && self.chunks.get(&key).is_some_and(Entry::is_ready)
+        self.makes_meshes && self.chunks.get(&key).is_some_and(Entry::is_to_be_drawn) && self.is_surrounded(key)
     }
 
     /// Whether a leaf waits for samples around it.
     pub(super) fn waits_for_samples(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| match &entry.role {
-            Role::Leaf { shown, is_stale } => entry.missing > 0 && (*is_stale || matches!(shown, Shown::Nothing)),
-            Role::Support => false,
+        self.chunks.get(&key).is_some_and(Entry::is_to_be_drawn) && !self.is_surrounded(key)
+    }
+
+    /// Whether a chunk and all around it have their samples, as far as there are any.
+    fn is_surrounded(&self, key: ChunkKey) -> bool {
+        self.filled.are_all_around(key, &self.extent)
+    }
+
+    /// Whether a chunk is as far as it gets if no more is wanted than this.
+    pub(super) fn has_all(&self, key: ChunkKey, wanted: Wanted) -> bool {
+        self.chunks.get(&key).is_some_and(|entry| match entry.role {
+            Role::Leaf { .. } => !entry.is_to_be_drawn(),
+            Role::Support => wanted <= Wanted::Samples,
         })
     }
 
@@ -223,16 +242,15 @@ impl ChunkTable {
         self.chunks.keys().filter_map(|key| Some((*key, self.drawn(*key)?.entity)))
     }
 
-    /// A chunk came into range. `extent`: the chunks that there are.
-    pub(super) fn load(&mut self, key: ChunkKey, wanted: Wanted, extent: Region) {
-        let is_missing = |near: &ChunkKey| extent.contains(near.position) && !self.is_filled(*near);
-        let missing = key.around().filter(is_missing).count() as u8;
+    /// A chunk came into range.
+    pub(super) fn load(&mut self, key: ChunkKey, wanted: Wanted) {
         let role = if wanted == Wanted::Mesh { Role::NEW_LEAF } else { Role::Support };
-        let entry = Entry { role, fill: Fill::Unasked, signs: Signs::UNKNOWN, missing, is_outdated: false };
+        let entry = Entry { role, fill: Fill::Unasked, signs: Signs::UNKNOWN, is_outdated: false };
         self.counts.add(&entry);
         if let Some(former) = self.chunks.insert(key, entry) {
             debug_assert!(false, "{key:?} was loaded already");
             self.counts.take(&former);
+            self.filled.set(key, false);
         }
     }
 
@@ -265,7 +283,7 @@ impl ChunkTable {
             Fill::Unasked | Fill::Queued | Fill::Dropped => Unloaded::Nothing,
             Fill::Asked(..) => Unloaded::Job,
             Fill::Resident => {
-                self.samples_lost(key);
+                self.filled.set(key, false);
                 Unloaded::Samples
             }
         }
@@ -290,13 +308,7 @@ impl ChunkTable {
             entry.is_outdated &= matches!(&entry.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned));
         });
         if !was_filled && self.contains(key) {
-            for near in key.around() {
-                let Some(entry) = self.chunks.get_mut(&near) else { continue };
-                entry.missing -= 1;
-                if entry.missing == 0 {
-                    self.look_again(near);
-                }
-            }
+            self.filled.surrounded_around(key, &self.extent).for_each(|near| self.look_again(near));
         }
     }
 
@@ -311,7 +323,6 @@ impl ChunkTable {
     pub(super) fn samples_dropped(&mut self, key: ChunkKey) {
         if self.is_filled(key) {
             self.change(key, |entry| entry.fill = Fill::Dropped);
-            self.samples_lost(key);
         }
     }
 
@@ -413,18 +424,13 @@ impl ChunkTable {
     }
 
     /// All samples are to be had anew. What is shown stays until then.
-    pub(super) fn refill(&mut self, extent: Region) {
-        let inner = Region::new(extent.min.map(|v| v.saturating_add(1)), extent.max.map(|v| v.saturating_sub(1)));
+    pub(super) fn refill(&mut self) {
         self.ready = UniqueQueue::default();
         self.counts = Counts::default();
-        for (key, entry) in &mut self.chunks {
+        self.filled.clear();
+        for entry in self.chunks.values_mut() {
             entry.fill = Fill::Unasked;
             entry.signs = Signs::UNKNOWN;
-            entry.missing = if inner.contains(key.position) {
-                27
-            } else {
-                key.around().filter(|near| extent.contains(near.position)).count() as u8
-            };
             if let Role::Leaf { shown, is_stale } = &mut entry.role {
                 *is_stale = matches!(shown, Shown::Empty | Shown::Mesh(_));
             }
@@ -433,37 +439,33 @@ impl ChunkTable {
         }
     }
 
-    /// A chunk has its samples no longer: those around it cannot be drawn anew.
-    fn samples_lost(&mut self, key: ChunkKey) {
-        for near in key.around() {
-            if let Some(entry) = self.chunks.get_mut(&near) {
-                entry.missing += 1;
-            }
-        }
-    }
-
     /// Every change that counts goes through here: it keeps the counts and finds what becomes ready.
     fn change(&mut self, key: ChunkKey, change: impl FnOnce(&mut Entry)) {
         let Some(entry) = self.chunks.get_mut(&key) else { return };
+        let was_filled = entry.is_filled();
         self.counts.take(entry);
         change(entry);
-        if self.without_meshes && entry.can_be_drawn() {
+        if entry.is_filled() != was_filled {
+            self.filled.set(key, entry.is_filled());
+        }
+        if self.makes_meshes {
+            if entry.is_to_be_drawn() && self.filled.are_all_around(key, &self.extent) {
+                self.ready.push(key);
+            }
+        } else if entry.is_outdated && entry.may_be_drawn() && self.filled.are_all_around(key, &self.extent) {
             entry.is_outdated = false;
         }
         self.counts.add(entry);
-        if !self.without_meshes && entry.is_ready() {
-            self.ready.push(key);
-        }
     }
 
     /// All that holds of any table.
     #[cfg(test)]
-    pub(super) fn check(&self, extent: Region) {
+    pub(super) fn check(&self) {
         let mut counts = Counts::default();
         for (key, entry) in &self.chunks {
             counts.add(entry);
-            let missing = key.around().filter(|near| extent.contains(near.position) && !self.is_filled(*near)).count();
-            assert_eq!(usize::from(entry.missing), missing, "{key:?}");
+            let is_there = |near: ChunkKey| self.is_filled(near) || !self.extent.contains(near.position);
+            assert_eq!(self.is_surrounded(*key), key.around().all(is_there), "{key:?}");
         }
         assert_eq!(self.counts, counts);
     }

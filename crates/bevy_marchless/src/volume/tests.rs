@@ -270,7 +270,7 @@ impl Game {
     /// What holds in every update.
     fn check(&self) {
         let heart = &self.heart;
-        heart.table.check(EXTENT);
+        heart.table.check();
         heart.groups.check();
         let drawn: HashMap<_, _> = heart.table.entities().map(|(key, entity)| (entity, key)).collect();
         assert_eq!(drawn.len(), self.screen.len(), "what is drawn is on the screen");

@@ -30,8 +30,6 @@ pub(super) struct Entry {
     pub(super) role: Role,
     pub(super) fill: Fill,
     pub(super) signs: Signs,
-    /// How many chunks of its 3 × 3 × 3 surroundings, itself included, are not filled.
-    pub(super) missing: u8,
     pub(super) is_outdated: bool,
 }
 
@@ -101,13 +99,15 @@ impl Entry {
         matches!(self.fill, Fill::Resident)
     }
 
-    pub(super) const fn can_be_drawn(&self) -> bool {
-        self.missing == 0 && matches!(&self.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned))
+    /// Whether it is a leaf that is drawn where all samples are there.
+    pub(super) const fn may_be_drawn(&self) -> bool {
+        matches!(&self.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned))
     }
 
-    pub(super) const fn is_ready(&self) -> bool {
+    /// Whether it is a leaf, and what is shown of it is not up to date.
+    pub(super) const fn is_to_be_drawn(&self) -> bool {
         match &self.role {
-            Role::Leaf { shown, is_stale } => self.can_be_drawn() && (*is_stale || matches!(shown, Shown::Nothing)),
+            Role::Leaf { shown, is_stale } => self.may_be_drawn() && (*is_stale || matches!(shown, Shown::Nothing)),
             Role::Support => false,
         }
     }
