@@ -5,7 +5,7 @@ mod queue;
 mod range;
 mod rows;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use bevy_ecs::entity::Entity;
 use bevy_math::IVec3;
@@ -68,16 +68,26 @@ pub(crate) type ViewId = Option<Entity>;
 /// What all viewers of one terrain see.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cover {
-    views: BTreeMap<ViewId, View>,
-    borders: BTreeMap<ViewId, Borders>,
+    views: BTreeMap<ViewId, Watched>,
+    /// Those that are revealed in part.
+    partial: BTreeSet<ViewId>,
     /// Whether some view has ever asked that samples are dropped: they have to come back some time.
     drops: bool,
+}
+
+/// A view, and how much of it has been told.
+#[derive(Clone, Debug)]
+struct Watched {
+    view: View,
+    borders: Borders,
+    /// Chunks up to so many from the middle have been told; infinite: all.
+    revealed: f64,
 }
 
 impl Cover {
     /// What one viewer sees.
     pub(crate) fn view(&self, id: ViewId) -> Option<&View> {
-        self.views.get(&id)
+        Some(&self.views.get(&id)?.view)
     }
 
     /// Whether samples that are not needed for now may be dropped.
@@ -86,35 +96,74 @@ impl Cover {
     }
 
     /// Changes what one viewer sees; `None`: it is gone. `come` is told the chunks that may now be wanted more than
-    /// before, and how much of them, `go` those that may be wanted less; some of them twice.
+    /// before, and how much of them, `go` those that may be wanted less, and how much of them at most; some of them twice.
+    ///
+    /// Of a view that is new or differs a lot, nothing comes before it is [revealed](Self::reveal) ring by ring: it may
+    /// have any number of chunks.
     pub(crate) fn set(
         &mut self,
         id: ViewId,
         view: Option<View>,
         come: impl FnMut([i32; 3], Wanted),
-        go: impl FnMut([i32; 3]),
+        go: impl FnMut([i32; 3], Wanted),
     ) {
-        let old = match view {
-            Some(view) => self.views.insert(id, view),
-            None => self.views.remove(&id),
+        let old = self.views.remove(&id);
+        let Some(view) = view else {
+            self.partial.remove(&id);
+            if let Some(old) = old {
+                Borders::default().go(&old.borders, go);
+            }
+            return;
         };
-        self.drops |= view.is_some_and(|view| view.samples.is_some());
-        if view.zip(old).is_some_and(|(view, old)| view.has_borders_of(&old)) {
+        self.drops |= view.samples.is_some();
+        if let Some(old) = old.as_ref().filter(|old| view.has_borders_of(&old.view)) {
+            self.views.insert(id, Watched { view, ..old.clone() });
             return;
         }
-        let borders = view.as_ref().map(Borders::of).unwrap_or_default();
-        let before = self.borders.remove(&id).unwrap_or_default();
-        borders.come(&before, come);
-        borders.go(&before, go);
-        if view.is_some() {
-            self.borders.insert(id, borders);
+        let borders = Borders::of(&view);
+        let (former, revealed) = match &old {
+            Some(old) if view.is_near(&old.view) => (Some(old), old.revealed),
+            _ => (None, 0.0),
+        };
+        match former {
+            Some(old) if revealed.is_infinite() => borders.come(&old.borders, come),
+            Some(old) => Borders::of(&view.within(revealed)).come(&Borders::of(&old.view.within(revealed)), come),
+            None => _ = self.partial.insert(id),
+        }
+        if let Some(old) = &old {
+            borders.go(&old.borders, go);
+        }
+        self.views.insert(id, Watched { view, borders, revealed });
+    }
+
+    /// Whether all has been told of what viewers ask for.
+    pub(crate) fn is_revealed(&self) -> bool {
+        self.partial.is_empty()
+    }
+
+    /// The views that are revealed in part.
+    pub(crate) fn partial(&self) -> impl Iterator<Item = ViewId> + '_ {
+        self.partial.iter().copied()
+    }
+
+    /// Tells one ring more of a view that is revealed in part; a ring is a chunk wide.
+    pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Wanted)) {
+        let Some(Watched { view, borders, revealed }) = self.views.get_mut(&id) else { return };
+        let before = if *revealed > 0.0 { Borders::of(&view.within(*revealed)) } else { Borders::default() };
+        *revealed += 1.0;
+        if *revealed < view.range.longest() {
+            Borders::of(&view.within(*revealed)).come(&before, come);
+        } else {
+            *revealed = f64::INFINITY;
+            borders.come(&before, come);
+            self.partial.remove(&id);
         }
     }
 
-    /// All chunks of which a viewer may want more than nothing.
-    pub(crate) fn list(&self, id: ViewId, come: impl FnMut([i32; 3], Wanted)) {
-        if let Some(borders) = self.borders.get(&id) {
-            borders.come(&Borders::default(), come);
+    /// All chunks of views that are revealed in part.
+    pub(crate) fn partly_revealed(&self, mut take: impl FnMut([i32; 3])) {
+        for watched in self.partial.iter().filter_map(|id| self.views.get(id)) {
+            watched.borders.come(&Borders::default(), |position, _| take(position));
         }
     }
 
@@ -157,7 +206,8 @@ impl Cover {
 
     /// The viewer to which a chunk matters most, and how urgent it is there: the lower, the sooner.
     pub(crate) fn most_urgent(&self, position: [i32; 3]) -> Option<(ViewId, u32)> {
-        let near = self.views.iter().filter(|(_, view)| view.bounds().contains(position));
+        let views = self.views.iter().map(|(id, watched)| (id, &watched.view));
+        let near = views.filter(|(_, view)| view.bounds().contains(position));
         near.map(|(id, view)| (*id, view.urgency(position))).min_by_key(|(_, urgency)| *urgency)
     }
 
@@ -168,18 +218,18 @@ impl Cover {
 
     /// How many chunks all viewers ask for together, or more where they see the same.
     pub(crate) fn size(&self) -> f64 {
-        self.views.values().map(|view| view.range.box_size()).sum()
+        self.views.values().map(|watched| watched.view.range.box_size()).sum()
     }
 
     /// The views that may ask anything of a chunk.
     fn near(&self, position: [i32; 3]) -> impl Iterator<Item = &View> + '_ {
-        self.views.values().filter(move |view| view.bounds().contains(position))
+        self.views.values().map(|watched| &watched.view).filter(move |view| view.bounds().contains(position))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
+    use std::collections::BTreeMap;
 
     use marchless::Region;
     use proptest::prelude::*;
@@ -188,51 +238,147 @@ mod tests {
 
     const EXTENT: Region = Region { min: [-6, -4, -9], max: [7, 3, 9] };
 
-    fn view() -> impl Strategy<Value = View> {
-        let range = (prop::array::uniform3(-5.0..5.0f64), prop::array::uniform3(0.1..5.0f64))
-            .prop_map(|(middle, radii)| Range::ellipsoid(middle, radii, EXTENT));
-        let boxed = (prop::array::uniform3(-6..6i32), prop::array::uniform3(0..5i32))
-            .prop_map(|(min, size)| Range::of_box(Region::new(min, [0, 1, 2].map(|i| min[i] + size[i])), EXTENT));
-        let samples = prop::option::of(0.0..4.0f64);
-        (prop_oneof![range, boxed], 0.0..2.0f64, samples).prop_map(|(range, margin, samples)| {
+    /// What a viewer is like: its place, its radii, its margin and within which radius samples stay.
+    #[derive(Clone, Copy, Debug)]
+    struct Viewer {
+        middle: [f64; 3],
+        radii: [f64; 3],
+        is_box: bool,
+        margin: f64,
+        samples: Option<f64>,
+    }
+
+    impl Viewer {
+        fn view(&self) -> View {
+            let Self { middle, radii, is_box, margin, samples } = *self;
+            let end = |sign: f64| [0, 1, 2].map(|axis| (middle[axis] + sign * radii[axis]).round() as i32);
+            let range = if is_box {
+                Range::of_box(Region::new(end(-1.0), end(1.0)), EXTENT)
+            } else {
+                Range::ellipsoid(middle, radii, EXTENT)
+            };
             let samples = samples.map(|radius| Range::ellipsoid(range.middle(), [radius + 0.1; 3], EXTENT));
             View::new(range, margin, samples, [0.0; 3])
-        })
+        }
+    }
+
+    fn viewer() -> impl Strategy<Value = Viewer> {
+        let place = (prop::array::uniform3(-5.0..5.0f64), prop::array::uniform3(0.1..5.0f64));
+        (place, any::<bool>(), 0.0..2.0f64, prop::option::of(0.0..4.0f64))
+            .prop_map(|((middle, radii), is_box, margin, samples)| Viewer { middle, radii, is_box, margin, samples })
+    }
+
+    /// What happens to a viewer.
+    #[derive(Clone, Debug)]
+    enum Step {
+        Becomes(Viewer),
+        Moves([f64; 3]),
+        Goes,
+    }
+
+    fn step() -> impl Strategy<Value = Step> {
+        let moves = prop::array::uniform3(-1.0..1.0f64);
+        prop_oneof![3 => viewer().prop_map(Step::Becomes), 6 => moves.prop_map(Step::Moves), 1 => Just(Step::Goes)]
+    }
+
+    /// Chunks that follow what they are told, as a terrain's do.
+    #[derive(Default)]
+    struct Followers {
+        there: BTreeMap<[i32; 3], Wanted>,
+        /// Those that are to be looked at.
+        told: BTreeSet<[i32; 3]>,
+        /// Those whose samples have been asked for since they may have been dropped.
+        sampled: BTreeSet<[i32; 3]>,
+    }
+
+    impl Followers {
+        fn of(&self, position: [i32; 3]) -> Wanted {
+            self.there.get(&position).copied().unwrap_or(Wanted::Gone)
+        }
+
+        fn come(&mut self, position: [i32; 3], wanted: Wanted, drops: bool) {
+            if drops || self.of(position) < wanted {
+                self.told.insert(position);
+            }
+        }
+
+        fn go(&mut self, position: [i32; 3], most: Wanted, drops: bool) {
+            if self.of(position) > if drops { Wanted::Gone } else { most } {
+                self.told.insert(position);
+            }
+        }
+
+        fn reveal(&mut self, cover: &mut Cover) {
+            let (partial, drops) = (cover.partial().collect::<Vec<_>>(), cover.drops_samples());
+            for id in partial {
+                cover.reveal(id, |position, wanted| self.come(position, wanted, drops));
+            }
+        }
+
+        fn follow(&mut self, cover: &Cover) {
+            for position in core::mem::take(&mut self.told) {
+                self.there.insert(position, cover.wanted(position, self.of(position)));
+                if cover.may_drop_samples(position) {
+                    self.sampled.remove(&position);
+                } else if cover.wants_samples(position) {
+                    self.sampled.insert(position);
+                }
+            }
+        }
     }
 
     proptest! {
         #[test]
-        fn changes_hold_every_chunk_of_which_more_or_less_is_wanted(
-            steps in prop::collection::vec((0u32..4, prop::option::weighted(0.8, view())), 1..12),
+        fn who_follows_what_it_is_told_is_as_it_is_wanted(
+            steps in prop::collection::vec((0u32..3, step(), 0..7u32, any::<bool>()), 1..20),
         ) {
             let mut cover = Cover::default();
-            for (viewer, view) in steps {
-                let id = Entity::from_raw_u32(viewer);
-                let before = cover.clone();
-                let (mut come, mut gone) = (BTreeSet::new(), BTreeSet::new());
-                cover.set(id, view, |position, wanted| { come.insert((position, wanted)); }, |position| { gone.insert(position); });
-                for position in EXTENT.grown(2, 2).points() {
-                    for now in [Wanted::Gone, Wanted::Samples, Wanted::Mesh] {
-                        let wanted = cover.wanted(position, now);
-                        if before.wanted(position, now) == now && wanted != now {
-                            let is_told = if wanted > now { come.contains(&(position, wanted)) } else { gone.contains(&position) };
-                            prop_assert!(is_told, "{:?}: {:?}, not {:?}", position, wanted, now);
-                        }
+            let mut viewers = BTreeMap::new();
+            let mut followers = Followers::default();
+            for (viewer, step, rings, follows) in steps {
+                match step {
+                    Step::Becomes(settings) => _ = viewers.insert(viewer, settings),
+                    Step::Moves(offset) => {
+                        viewers.entry(viewer).and_modify(|settings: &mut Viewer| {
+                            settings.middle = [0, 1, 2].map(|axis| settings.middle[axis] + offset[axis]);
+                        });
                     }
-                    if !before.wants_samples(position) && cover.wants_samples(position) {
-                        prop_assert!(come.contains(&(position, Wanted::Samples)), "samples of {:?} are wanted again", position);
-                    }
-                    if !before.may_drop_samples(position) && cover.may_drop_samples(position) {
-                        prop_assert!(gone.contains(&position), "samples of {:?} may be dropped", position);
-                    }
+                    Step::Goes => _ = viewers.remove(&viewer),
+                }
+                let view = viewers.get(&viewer).map(Viewer::view);
+                let drops = cover.drops_samples() || view.is_some_and(|view| view.samples.is_some());
+                let shared = core::cell::RefCell::new(&mut followers);
+                cover.set(
+                    Entity::from_raw_u32(viewer),
+                    view,
+                    |position, wanted| shared.borrow_mut().come(position, wanted, drops),
+                    |position, most| shared.borrow_mut().go(position, most, drops),
+                );
+                (0..rings).for_each(|_| followers.reveal(&mut cover));
+                if follows {
+                    followers.follow(&cover);
+                }
+            }
+            while !cover.is_revealed() {
+                followers.reveal(&mut cover);
+            }
+            followers.follow(&cover);
+            for position in EXTENT.grown(2, 2).points() {
+                let now = followers.of(position);
+                prop_assert_eq!(cover.wanted(position, now), now, "{:?}", position);
+                if cover.drops_samples() {
+                    let is_there = followers.sampled.contains(&position);
+                    prop_assert!(is_there || !cover.wants_samples(position), "samples of {:?} are wanted", position);
+                    let is_there = is_there && now > Wanted::Gone;
+                    prop_assert!(!is_there || !cover.may_drop_samples(position), "samples of {:?} stay", position);
                 }
             }
         }
 
         #[test]
-        fn bounds_hold_all_that_a_view_asks_for(view in view()) {
-            let mut cover = Cover::default();
-            cover.set(None, Some(view), |_, _| {}, |_| {});
+        fn bounds_hold_all_that_a_view_asks_for(viewer in viewer()) {
+            let (mut cover, view) = (Cover::default(), viewer.view());
+            cover.set(None, Some(view), |_, _| {}, |_, _| {});
             for position in EXTENT.grown(3, 3).points() {
                 let asks = view.with_margin().grown(1.0).contains(position)
                     || view.samples.is_some_and(|range| range.widened(view.margin).grown(0.0).contains(position));

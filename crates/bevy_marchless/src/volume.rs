@@ -69,8 +69,6 @@ pub(crate) struct Heart {
     cover: Cover,
     /// Whether some viewer has moved since chunks last followed.
     has_moved: bool,
-    /// New viewers, whose chunks are still to be listed.
-    unlisted: VecDeque<ViewId>,
     /// Chunks of which more may be wanted, and of which less.
     arriving: ChunkQueue,
     leaving: UniqueQueue,
@@ -118,7 +116,6 @@ impl Default for Heart {
             groups: Groups::default(),
             cover: Cover::default(),
             has_moved: false,
-            unlisted: VecDeque::new(),
             arriving: ChunkQueue::default(),
             leaving: UniqueQueue::default(),
             to_fill: ChunkQueue::default(),
@@ -240,17 +237,14 @@ impl Heart {
         let counts = self.table.counts();
         let is_coming = |key: &ChunkKey| !self.table.is_leaf(*key) && self.cover.contains(key.position);
         let mut coming: HashSet<ChunkKey> = self.arriving.iter().filter(is_coming).collect();
-        for id in &self.unlisted {
-            let listed = |position, _| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming));
-            self.cover.list(*id, listed);
-        }
+        self.cover.partly_revealed(|position| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming)));
         Coverage { waiting: counts.waiting + coming.len(), empty: counts.empty, drawn: counts.drawn }
     }
 
     /// Whether all chunks in range have their samples.
     pub(crate) fn is_filled(&self) -> bool {
-        let is_listed = self.unlisted.is_empty() && self.arriving.is_empty();
-        let is_idle = is_listed && self.leaving.is_empty() && self.remote.is_empty();
+        let have_come = self.cover.is_revealed() && self.arriving.is_empty();
+        let is_idle = have_come && self.leaving.is_empty() && self.remote.is_empty();
         self.recipe.is_some()
             && self.table.counts().unfilled == 0
             && is_idle
@@ -288,32 +282,25 @@ impl Heart {
 
     /// Changes what a viewer sees; `None`: it is gone.
     pub(crate) fn set_view(&mut self, id: ViewId, view: Option<crate::cover::View>) {
-        let Self { cover, table, arriving, leaving, to_fill, to_mesh, unlisted, has_moved, .. } = self;
+        let Self { cover, table, arriving, leaving, to_fill, to_mesh, has_moved, .. } = self;
         let old = cover.view(id).copied();
         if old == view {
             return;
         }
         *has_moved = true;
-        match (old, view) {
-            (None, Some(_)) => unlisted.push_back(id),
-            (Some(_), None) => unlisted.retain(|other| *other != id),
-            _ => {}
-        }
-        // All chunks of a new viewer take time to list: one viewer after the other.
-        let is_listed = !unlisted.contains(&id);
         let keeps_samples = !cover.drops_samples() && view.is_none_or(|view| view.samples.is_none());
         cover.set(
             id,
             view,
             |position, wanted| {
                 let key = ChunkKey::finest(position);
-                if is_listed && !(keeps_samples && table.has_all(key, wanted)) {
+                if !(keeps_samples && table.has_all(key, wanted)) {
                     arriving.add_unsorted(key, id);
                 }
             },
-            |position| {
+            |position, most| {
                 let key = ChunkKey::finest(position);
-                if table.contains(key) {
+                if table.contains(key) && !(keeps_samples && table.has_no_more(key, most)) {
                     leaving.push(key);
                 }
             },

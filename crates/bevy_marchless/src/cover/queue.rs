@@ -68,6 +68,11 @@ impl ChunkQueue {
         self.members.len() + self.first.len()
     }
 
+    /// How many chunks wait for a viewer.
+    pub(crate) fn len_of(&self, id: ViewId) -> usize {
+        self.agendas.get(&id).map_or(0, |agenda| agenda.soon.len() + agenda.later.len())
+    }
+
     /// All chunks, in no order; one that has been put first may come twice.
     pub(crate) fn iter(&self) -> impl Iterator<Item = ChunkKey> + '_ {
         self.first.keys.iter().chain(&self.members).copied()
@@ -243,7 +248,7 @@ mod tests {
     fn cover(views: &[(ViewId, View)]) -> Cover {
         let mut cover = Cover::default();
         for (id, view) in views {
-            cover.set(*id, Some(*view), |_, _| {}, |_| {});
+            cover.set(*id, Some(*view), |_, _| {}, |_, _| {});
         }
         cover
     }
@@ -295,7 +300,7 @@ mod tests {
             for (position, owner) in &positions {
                 queue.add_unsorted(ChunkKey::finest(*position), ids[*owner as usize]);
             }
-            cover.set(ids[1], None, |_, _| {}, |_| {});
+            cover.set(ids[1], None, |_, _| {}, |_, _| {});
             queue.remove_view(ids[1], &cover);
             let found: Vec<_> =
                 core::iter::from_fn(|| queue.pop(&cover, |_| true)).map(|key| key.position).collect();

@@ -213,6 +213,27 @@ impl View {
         }
     }
 
+    /// As much of it as lies within so many chunks from the middle, along the longest axis.
+    #[must_use]
+    pub(super) fn within(&self, chunks: f64) -> Self {
+        let factor = chunks / self.range.longest().max(chunks);
+        let samples = self.samples.map(|samples| samples.shrunk(factor));
+        Self::new(self.range.shrunk(factor), self.margin, samples, self.forward)
+    }
+
+    /// Whether it differs from another one by a few steps of a viewer, so that few chunks differ.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 2.0);
+        let are_near = |a: &Range, b: &Range| {
+            near(a.middle, b.middle) && a.radii == b.radii && (a.is_box, a.extent) == (b.is_box, b.extent)
+        };
+        let have_near_samples = match (&self.samples, &other.samples) {
+            (Some(samples), Some(other)) => are_near(samples, other),
+            (samples, other) => samples.is_none() && other.is_none(),
+        };
+        are_near(&self.range, &other.range) && have_near_samples
+    }
+
     /// Whether other chunks may be urgent for this view than for an old one.
     pub(crate) fn differs_in_urgency(&self, old: &Self) -> bool {
         let moved = |axis: usize| (self.range.middle[axis] - old.range.middle[axis]).abs() >= 1.0;

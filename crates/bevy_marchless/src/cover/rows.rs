@@ -40,12 +40,17 @@ impl Rows {
     /// Takes the chunks that others do not have. `around`: rows whose own difference has what lies beyond them.
     fn difference(&self, others: &Self, around: Option<&Self>, take: &mut impl FnMut([i32; 3])) {
         let row_of = |rows: &Self, layer: &[[i32; 2]], y: i32| {
-            let index = y.checked_sub(rows.from[0]).and_then(|index| usize::try_from(index).ok());
-            index.and_then(|index| layer.get(index)).copied().unwrap_or([0, 0])
+            // Before the first row, that is a number that no layer has.
+            let index = y.wrapping_sub(rows.from[0]).cast_unsigned() as usize;
+            layer.get(index).copied().unwrap_or([0, 0])
         };
         for (z, spans) in (0..).zip(self.spans.chunks(self.count.max(1))) {
             let z = self.from[1] + z;
-            let (other_layer, around_layer) = (others.layer(z), around.map(|around| around.layer(z)));
+            let other_layer = others.layer(z);
+            // Most layers of two views a step apart are alike.
+            if self.from[0] == others.from[0] && spans == other_layer {
+                continue;
+            }
             for (y, &[mut start, mut end]) in (0..).zip(spans) {
                 let y = self.from[0] + y;
                 let mut other = row_of(others, other_layer, y);
@@ -55,8 +60,8 @@ impl Rows {
                 if other[0] >= other[1] {
                     other = [start, start];
                 }
-                if let Some((around, layer)) = around.zip(around_layer) {
-                    let [first, last] = row_of(around, layer, y);
+                if let Some(around) = around {
+                    let [first, last] = row_of(around, around.layer(z), y);
                     (start, end) = (start.max(first), end.min(last));
                 }
                 (start..end.min(other[0])).for_each(|x| take([x, y, z]));
@@ -102,9 +107,11 @@ impl Borders {
         }
     }
 
-    /// The chunks of which less may be wanted than with `old` borders.
-    pub(super) fn go(&self, old: &Self, mut take: impl FnMut([i32; 3])) {
-        old.stays.difference(&self.stays, Some(&self.stays_around), &mut take);
+    /// The chunks of which less may be wanted than with `old` borders, and how much at most.
+    pub(super) fn go(&self, old: &Self, mut take: impl FnMut([i32; 3], Wanted)) {
+        let stays_around = Some(&self.stays_around);
+        old.stays.difference(&self.stays, stays_around, &mut |position| take(position, Wanted::Samples));
+        let mut take = |position| take(position, Wanted::Gone);
         old.stays_around.difference(&self.stays_around, None, &mut take);
         if self.samples.is_some() || old.samples.is_some() {
             old.samples_stay().difference(self.samples_stay(), None, &mut take);

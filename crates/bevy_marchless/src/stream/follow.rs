@@ -1,5 +1,7 @@
 //! Finds what viewers see of each terrain, and lets chunks follow.
 
+use core::time::Duration;
+
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use bevy_math::DAffine3;
@@ -97,6 +99,8 @@ pub(super) fn follow_viewers(
         });
     }
     let until = budget.until(start, Share::Follow);
+    let share = until.saturating_duration_since(start);
+    let mut seeing = Duration::ZERO;
     for (terrain, mut volume, mut followed, place) in &mut terrains {
         if volume.settings().is_none() {
             continue;
@@ -113,14 +117,17 @@ pub(super) fn follow_viewers(
         let was_away = core::mem::replace(&mut followed.run, seen.run) + 1 != seen.run;
         let all = was_away || at.is_none() || followed.at != at;
         if all || !seen.changed.is_empty() || !seen.gone.is_empty() {
+            let start = Instant::now();
             let is_floating = place.is_floating();
             let mut view_of = ViewOf { terrain, to_world, is_floating, seen: &seen, reported: &mut reported };
             view_of.follow(&mut volume, &mut followed, all);
             followed.at = at;
+            seeing += start.elapsed();
         }
         if volume.heart().has_to_follow() {
             let heart = volume.heart_mut();
-            heart.follow(until, &mut stats);
+            // Noting what many moving viewers see must not stop what comes of it.
+            heart.follow(until + seeing.saturating_sub(share / 4), &mut stats);
             for entity in heart.take_released() {
                 commands.entity(entity).try_despawn();
             }

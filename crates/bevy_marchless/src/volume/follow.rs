@@ -7,16 +7,18 @@ use super::Heart;
 use super::table::Unloaded;
 use crate::budget::ENTITY_TIME;
 use crate::chunk::ChunkKey;
-use crate::cover::Wanted;
+use crate::cover::{ViewId, Wanted};
 use crate::stats::TerrainStats;
 
 /// Each update at least this many chunks come, and as many go.
 const LEAST: usize = 4;
+/// A view is revealed further while fewer of its chunks wait.
+const FEW: usize = 256;
 
 impl Heart {
     /// Whether chunks wait to come or to go.
     pub(crate) fn has_to_follow(&self) -> bool {
-        let is_idle = self.unlisted.is_empty() && self.arriving.is_empty() && self.leaving.is_empty();
+        let is_idle = self.cover.is_revealed() && self.arriving.is_empty() && self.leaving.is_empty();
         !is_idle || !self.droppable.is_empty() || self.has_lost_leaves()
     }
 
@@ -25,7 +27,7 @@ impl Heart {
         if self.recipe.is_none() {
             return;
         }
-        self.list_viewers(until);
+        self.reveal(until);
         // Both have half of the time, unless as many are on their way out as viewers see: then hardly any come.
         let is_crowded = self.leaving.len() as f64 > self.cover.size();
         let share = if self.arriving.is_empty() || is_crowded { 1 } else { 2 };
@@ -41,7 +43,7 @@ impl Heart {
         }
         let mut done = 0;
         while (done < LEAST || !is_crowded && Instant::now() + despawning(self) < until)
-            && let Some(key) = self.next_arriving()
+            && let Some(key) = self.next_arriving(until)
         {
             self.settle(key, stats);
             done += 1;
@@ -74,15 +76,24 @@ impl Heart {
         lost.into_iter().for_each(|key| self.leaving.push(key));
     }
 
-    /// Lists the chunks of new viewers, one at least.
-    fn list_viewers(&mut self, until: Instant) {
-        while let Some(id) = self.unlisted.pop_front() {
-            let Self { cover, arriving, .. } = self;
-            cover.list(id, |position, _| arriving.add_unsorted(ChunkKey::finest(position), id));
+    /// Reveals more of the views that are new, where few of their chunks wait; of one of them at least. Returns whether there
+    /// was one.
+    fn reveal(&mut self, until: Instant) -> bool {
+        let Self { cover, table, arriving, .. } = self;
+        let keeps_samples = !cover.drops_samples();
+        let few: Vec<ViewId> = cover.partial().filter(|id| arriving.len_of(*id) < FEW).collect();
+        for id in &few {
+            cover.reveal(*id, |position, wanted| {
+                let key = ChunkKey::finest(position);
+                if !(keeps_samples && table.has_all(key, wanted)) {
+                    arriving.add_unsorted(key, *id);
+                }
+            });
             if Instant::now() >= until {
                 break;
             }
         }
+        !few.is_empty()
     }
 
     /// The game has despawned a chunk's entity. Its samples stay: its neighbours' meshes need them.
@@ -90,9 +101,17 @@ impl Heart {
         self.table.despawned(key, entity);
     }
 
-    fn next_arriving(&mut self) -> Option<ChunkKey> {
-        let Self { arriving, cover, table, .. } = self;
-        arriving.pop(cover, |key| table.contains(*key) || cover.wanted(key.position, Wanted::Samples) > Wanted::Gone)
+    /// The next chunk of which more may be wanted.
+    fn next_arriving(&mut self, until: Instant) -> Option<ChunkKey> {
+        loop {
+            let Self { arriving, cover, table, .. } = self;
+            let waits =
+                |key: &ChunkKey| table.contains(*key) || cover.wanted(key.position, Wanted::Samples) > Wanted::Gone;
+            let next = arriving.pop(cover, waits);
+            if next.is_some() || !self.reveal(until) {
+                return next;
+            }
+        }
     }
 
     /// Makes of a chunk what the cover asks of it.

@@ -8,7 +8,7 @@ use super::samples::same_samples;
 impl Heart {
     /// How much memory the plugin's notes about chunks take, in bytes.
     pub(crate) fn notes_bytes(&self) -> usize {
-        self.table.len() * super::table::ENTRY_BYTES
+        self.table.bytes()
     }
 
     /// How much memory the samples of at most `most` chunks take, in bytes, from a position on; and the position where to

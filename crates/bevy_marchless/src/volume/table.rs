@@ -1,18 +1,17 @@
 //! [`ChunkTable`]: every loaded chunk of a terrain, and how far it is.
 
 mod entry;
-mod filled;
+mod map;
 
 use core::mem;
 use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
-use bevy_platform::collections::HashMap;
 use marchless::{MeshBuffer, Region};
 
 pub(crate) use entry::{Counts, Drawn, Shown};
 use entry::{Entry, Fill, Role};
-use filled::FilledChunks;
+use map::{ChunkMap, Mark};
 
 use super::Signs;
 use crate::chunk::ChunkKey;
@@ -27,18 +26,13 @@ pub(crate) struct ChunkTable {
     extent: Region,
     /// Whether somebody makes meshes; else chunks wait for none.
     makes_meshes: bool,
-    chunks: HashMap<ChunkKey, Entry>,
-    /// Those of them whose samples are resident.
-    filled: FilledChunks,
+    chunks: ChunkMap,
     /// Chunks that can be drawn, and of which what is shown is not up to date; each once, some stale.
     ready: UniqueQueue,
     counts: Counts,
     /// Entities that nothing is shown on any more.
     released: Vec<Entity>,
 }
-
-/// What a chunk takes in the table.
-pub(in crate::volume) const ENTRY_BYTES: usize = size_of::<(ChunkKey, Entry)>();
 
 /// What became of a job that samples, when its chunk was let go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,8 +64,7 @@ impl ChunkTable {
         Self {
             extent,
             makes_meshes,
-            chunks: HashMap::default(),
-            filled: FilledChunks::default(),
+            chunks: ChunkMap::default(),
             ready: UniqueQueue::default(),
             counts: Counts::default(),
             released: Vec::new(),
@@ -91,17 +84,22 @@ impl ChunkTable {
         self.chunks.len()
     }
 
+    /// How much memory it takes, in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        self.chunks.bytes()
+    }
+
     pub(crate) fn keys(&self) -> impl Iterator<Item = ChunkKey> + '_ {
-        self.chunks.keys().copied()
+        self.chunks.iter().map(|(key, _)| key)
     }
 
     pub(crate) fn contains(&self, key: ChunkKey) -> bool {
-        self.chunks.contains_key(&key)
+        self.chunks.has(key, Mark::Loaded)
     }
 
     /// What there is of a chunk, as the cover sees it: a leaf that has not been drawn is no more than its samples.
     pub(super) fn kept(&self, key: ChunkKey) -> Wanted {
-        match self.chunks.get(&key) {
+        match self.chunks.get(key) {
             None => Wanted::Gone,
             Some(Entry { role: Role::Leaf { shown, .. }, .. }) if !matches!(shown, Shown::Nothing) => Wanted::Mesh,
             Some(_) => Wanted::Samples,
@@ -109,12 +107,12 @@ impl ChunkTable {
     }
 
     pub(super) fn is_leaf(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| matches!(entry.role, Role::Leaf { .. }))
+        self.chunks.has(key, Mark::Current) || self.chunks.has(key, Mark::Waits)
     }
 
     /// What is shown of a leaf.
     pub(super) fn shown(&self, key: ChunkKey) -> Option<&Shown> {
-        match &self.chunks.get(&key)?.role {
+        match &self.chunks.get(key)?.role {
             Role::Support => None,
             Role::Leaf { shown, .. } => Some(shown),
         }
@@ -139,26 +137,26 @@ impl ChunkTable {
 
     /// Whether a chunk has its samples.
     pub(super) fn is_filled(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(Entry::is_filled)
+        self.chunks.has(key, Mark::Filled)
     }
 
     /// Whether a chunk is to be filled.
     pub(super) fn is_queued(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Queued))
+        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Queued))
     }
 
     /// Whether nobody has seen to a chunk's samples.
     pub(super) fn is_unasked(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Unasked))
+        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Unasked))
     }
 
     pub(super) fn is_dropped(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Dropped))
+        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Dropped))
     }
 
     /// Whether a chunk waits for the result of this job.
     pub(super) fn is_asked(&self, key: ChunkKey, job: u64) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(number, _) if number == job))
+        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(number, _) if number == job))
     }
 
     /// Whether samples of a chunk, or some around it, are missing.
@@ -168,35 +166,40 @@ impl ChunkTable {
 
     /// Whether a chunk is a leaf that can be drawn.
     pub(super) fn can_be_drawn(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(Entry::may_be_drawn) && self.is_surrounded(key)
+        self.chunks.get(key).is_some_and(Entry::may_be_drawn) && self.is_surrounded(key)
     }
 
     /// Whether a chunk can be drawn, and what is shown is not up to date.
     pub(super) fn is_ready(&self, key: ChunkKey) -> bool {
-        self.makes_meshes && self.chunks.get(&key).is_some_and(Entry::is_to_be_drawn) && self.is_surrounded(key)
+        self.makes_meshes && self.chunks.has(key, Mark::Waits) && self.is_surrounded(key)
     }
 
     /// Whether a leaf waits for samples around it.
     pub(super) fn waits_for_samples(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(Entry::is_to_be_drawn) && !self.is_surrounded(key)
+        self.chunks.has(key, Mark::Waits) && !self.is_surrounded(key)
     }
 
     /// Whether a chunk and all around it have their samples, as far as there are any.
     fn is_surrounded(&self, key: ChunkKey) -> bool {
-        self.filled.are_all_around(key, &self.extent)
+        self.chunks.is_surrounded(key, &self.extent)
     }
 
     /// Whether a chunk is as far as it gets if no more is wanted than this.
     pub(super) fn has_all(&self, key: ChunkKey, wanted: Wanted) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| match entry.role {
-            Role::Leaf { .. } => !entry.is_to_be_drawn(),
-            Role::Support => wanted <= Wanted::Samples,
-        })
+        match wanted {
+            Wanted::Mesh => self.chunks.has(key, Mark::Current),
+            Wanted::Samples | Wanted::Gone => self.contains(key) && !self.chunks.has(key, Mark::Waits),
+        }
+    }
+
+    /// Whether there is no more of a chunk than this.
+    pub(super) fn has_no_more(&self, key: ChunkKey, most: Wanted) -> bool {
+        most == Wanted::Mesh || !self.is_leaf(key) && (most == Wanted::Samples || !self.contains(key))
     }
 
     /// Whether what is shown of a chunk is up to date, as far as is known without looking at groups.
     pub(super) fn is_current(&self, key: ChunkKey) -> bool {
-        self.chunks.get(&key).is_some_and(|entry| match &entry.role {
+        self.chunks.get(key).is_some_and(|entry| match &entry.role {
             Role::Leaf { shown, is_stale } => !is_stale && !matches!(shown, Shown::Nothing),
             Role::Support => false,
         })
@@ -204,7 +207,7 @@ impl ChunkTable {
 
     /// Whether a chunk is known to have no surface at an isovalue.
     pub(super) fn is_without_surface(&self, key: ChunkKey, isovalue: f32) -> bool {
-        let signs = |key: ChunkKey| self.chunks.get(&key).map(|entry| entry.signs.at(isovalue));
+        let signs = |key: ChunkKey| self.chunks.get(key).map(|entry| entry.signs.at(isovalue));
         let ChunkKey { level, position } = key;
         signs(key).is_some_and(|own| {
             own.are_without_surface(|step| {
@@ -239,7 +242,10 @@ impl ChunkTable {
 
     /// All entities that something is shown on.
     pub(crate) fn entities(&self) -> impl Iterator<Item = (ChunkKey, Entity)> + '_ {
-        self.chunks.keys().filter_map(|key| Some((*key, self.drawn(*key)?.entity)))
+        self.chunks.iter().filter_map(|(key, entry)| match &entry.role {
+            Role::Leaf { shown: Shown::Mesh(drawn), .. } => Some((key, drawn.entity)),
+            _ => None,
+        })
     }
 
     /// A chunk came into range.
@@ -250,7 +256,6 @@ impl ChunkTable {
         if let Some(former) = self.chunks.insert(key, entry) {
             debug_assert!(false, "{key:?} was loaded already");
             self.counts.take(&former);
-            self.filled.set(key, false);
         }
     }
 
@@ -277,15 +282,12 @@ impl ChunkTable {
     /// A chunk went out of range.
     pub(super) fn unload(&mut self, key: ChunkKey) -> Unloaded {
         self.demote(key);
-        let Some(entry) = self.chunks.remove(&key) else { return Unloaded::Nothing };
+        let Some(entry) = self.chunks.remove(key) else { return Unloaded::Nothing };
         self.counts.take(&entry);
         match entry.fill {
             Fill::Unasked | Fill::Queued | Fill::Dropped => Unloaded::Nothing,
             Fill::Asked(..) => Unloaded::Job,
-            Fill::Resident => {
-                self.filled.set(key, false);
-                Unloaded::Samples
-            }
+            Fill::Resident => Unloaded::Samples,
         }
     }
 
@@ -308,15 +310,13 @@ impl ChunkTable {
             entry.is_outdated &= matches!(&entry.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned));
         });
         if !was_filled && self.contains(key) {
-            self.filled.surrounded_around(key, &self.extent).for_each(|near| self.look_again(near));
+            self.chunks.surrounded_around(key, &self.extent).for_each(|near| self.look_again(near));
         }
     }
 
     /// Stamps have changed a chunk's samples.
     pub(super) fn samples_changed(&mut self, key: ChunkKey) {
-        if let Some(entry) = self.chunks.get_mut(&key) {
-            entry.signs = Signs::UNKNOWN;
-        }
+        self.chunks.change(key, |entry| entry.signs = Signs::UNKNOWN);
     }
 
     /// A chunk's samples have been dropped; they can be had again.
@@ -426,46 +426,51 @@ impl ChunkTable {
     /// All samples are to be had anew. What is shown stays until then.
     pub(super) fn refill(&mut self) {
         self.ready = UniqueQueue::default();
-        self.counts = Counts::default();
-        self.filled.clear();
-        for entry in self.chunks.values_mut() {
+        let mut counts = Counts::default();
+        self.chunks.change_all(|entry| {
             entry.fill = Fill::Unasked;
             entry.signs = Signs::UNKNOWN;
             if let Role::Leaf { shown, is_stale } = &mut entry.role {
                 *is_stale = matches!(shown, Shown::Empty | Shown::Mesh(_));
             }
             entry.is_outdated = true;
-            self.counts.add(entry);
-        }
+            counts.add(entry);
+        });
+        self.counts = counts;
     }
 
     /// Every change that counts goes through here: it keeps the counts and finds what becomes ready.
     fn change(&mut self, key: ChunkKey, change: impl FnOnce(&mut Entry)) {
-        let Some(entry) = self.chunks.get_mut(&key) else { return };
-        let was_filled = entry.is_filled();
-        self.counts.take(entry);
-        change(entry);
-        if entry.is_filled() != was_filled {
-            self.filled.set(key, entry.is_filled());
+        let Self { chunks, counts, .. } = self;
+        let change = |entry: &mut Entry| {
+            counts.take(entry);
+            change(entry);
+            counts.add(entry);
+            if self.makes_meshes { entry.is_to_be_drawn() } else { entry.is_outdated && entry.may_be_drawn() }
+        };
+        let may_become_ready = chunks.change(key, change).unwrap_or(false);
+        if !may_become_ready || !self.is_surrounded(key) {
+            return;
         }
         if self.makes_meshes {
-            if entry.is_to_be_drawn() && self.filled.are_all_around(key, &self.extent) {
-                self.ready.push(key);
-            }
-        } else if entry.is_outdated && entry.may_be_drawn() && self.filled.are_all_around(key, &self.extent) {
-            entry.is_outdated = false;
+            self.ready.push(key);
+        } else {
+            // Nothing of the present source will be shown.
+            self.counts.outdated -= 1;
+            self.chunks.change(key, |entry| entry.is_outdated = false);
         }
-        self.counts.add(entry);
     }
 
     /// All that holds of any table.
     #[cfg(test)]
     pub(super) fn check(&self) {
         let mut counts = Counts::default();
-        for (key, entry) in &self.chunks {
+        for (key, entry) in self.chunks.iter() {
             counts.add(entry);
             let is_there = |near: ChunkKey| self.is_filled(near) || !self.extent.contains(near.position);
-            assert_eq!(self.is_surrounded(*key), key.around().all(is_there), "{key:?}");
+            assert_eq!(self.is_surrounded(key), key.around().all(is_there), "{key:?}");
+            let marks = [Mark::Loaded, Mark::Filled, Mark::Current, Mark::Waits].map(|mark| self.chunks.has(key, mark));
+            assert_eq!(marks, entry.marks(), "{key:?}");
         }
         assert_eq!(self.counts, counts);
     }

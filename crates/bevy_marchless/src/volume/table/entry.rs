@@ -95,6 +95,12 @@ impl Shown {
 }
 
 impl Entry {
+    /// Which [`Mark`](super::map::Mark)s it has, in their order.
+    pub(super) const fn marks(&self) -> [bool; 4] {
+        let (is_leaf, waits) = (matches!(self.role, Role::Leaf { .. }), self.is_to_be_drawn());
+        [true, self.is_filled(), is_leaf && !waits, waits]
+    }
+
     pub(super) const fn is_filled(&self) -> bool {
         matches!(self.fill, Fill::Resident)
     }
