@@ -39,7 +39,7 @@ pub(crate) use signs::Signs;
 pub(crate) use table::{ChunkTable, Drawn, Place};
 
 use crate::chunk::ChunkKey;
-use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, UniqueQueue, ViewId};
+use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, UniqueQueue, ViewId, Wanted};
 use crate::jobs::{Results, Ticket};
 use groups::Groups;
 use restyle::{Look, Transition};
@@ -300,7 +300,7 @@ impl Heart {
             },
             |position, most| {
                 let key = ChunkKey::finest(position);
-                if table.contains(key) && !(keeps_samples && table.has_no_more(key, most)) {
+                if table.has_more(key, if keeps_samples { most } else { Wanted::Gone }) {
                     leaving.push(key);
                 }
             },

@@ -11,7 +11,7 @@ use marchless::{MeshBuffer, Region};
 
 pub(crate) use entry::{Counts, Drawn, Shown};
 use entry::{Entry, Fill, Role};
-use map::{ChunkMap, Mark};
+use map::{ChunkMap, Marks};
 
 use super::Signs;
 use crate::chunk::ChunkKey;
@@ -94,7 +94,7 @@ impl ChunkTable {
     }
 
     pub(crate) fn contains(&self, key: ChunkKey) -> bool {
-        self.chunks.has(key, Mark::Loaded)
+        self.chunks.marks(key).is_loaded
     }
 
     /// What there is of a chunk, as the cover sees it: a leaf that has not been drawn is no more than its samples.
@@ -107,7 +107,8 @@ impl ChunkTable {
     }
 
     pub(super) fn is_leaf(&self, key: ChunkKey) -> bool {
-        self.chunks.has(key, Mark::Current) || self.chunks.has(key, Mark::Waits)
+        let Marks { is_current, waits, .. } = self.chunks.marks(key);
+        is_current || waits
     }
 
     /// What is shown of a leaf.
@@ -137,7 +138,7 @@ impl ChunkTable {
 
     /// Whether a chunk has its samples.
     pub(super) fn is_filled(&self, key: ChunkKey) -> bool {
-        self.chunks.has(key, Mark::Filled)
+        self.chunks.marks(key).is_filled
     }
 
     /// Whether a chunk is to be filled.
@@ -171,12 +172,12 @@ impl ChunkTable {
 
     /// Whether a chunk can be drawn, and what is shown is not up to date.
     pub(super) fn is_ready(&self, key: ChunkKey) -> bool {
-        self.makes_meshes && self.chunks.has(key, Mark::Waits) && self.is_surrounded(key)
+        self.makes_meshes && self.chunks.marks(key).waits && self.is_surrounded(key)
     }
 
     /// Whether a leaf waits for samples around it.
     pub(super) fn waits_for_samples(&self, key: ChunkKey) -> bool {
-        self.chunks.has(key, Mark::Waits) && !self.is_surrounded(key)
+        self.chunks.marks(key).waits && !self.is_surrounded(key)
     }
 
     /// Whether a chunk and all around it have their samples, as far as there are any.
@@ -186,15 +187,18 @@ impl ChunkTable {
 
     /// Whether a chunk is as far as it gets if no more is wanted than this.
     pub(super) fn has_all(&self, key: ChunkKey, wanted: Wanted) -> bool {
-        match wanted {
-            Wanted::Mesh => self.chunks.has(key, Mark::Current),
-            Wanted::Samples | Wanted::Gone => self.contains(key) && !self.chunks.has(key, Mark::Waits),
-        }
+        let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
+        if wanted == Wanted::Mesh { is_current } else { is_loaded && !waits }
     }
 
-    /// Whether there is no more of a chunk than this.
-    pub(super) fn has_no_more(&self, key: ChunkKey, most: Wanted) -> bool {
-        most == Wanted::Mesh || !self.is_leaf(key) && (most == Wanted::Samples || !self.contains(key))
+    /// Whether there is more of a chunk than this.
+    pub(super) fn has_more(&self, key: ChunkKey, most: Wanted) -> bool {
+        let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
+        match most {
+            Wanted::Gone => is_loaded,
+            Wanted::Samples => is_current || waits,
+            Wanted::Mesh => false,
+        }
     }
 
     /// Whether what is shown of a chunk is up to date, as far as is known without looking at groups.
@@ -469,8 +473,7 @@ impl ChunkTable {
             counts.add(entry);
             let is_there = |near: ChunkKey| self.is_filled(near) || !self.extent.contains(near.position);
             assert_eq!(self.is_surrounded(key), key.around().all(is_there), "{key:?}");
-            let marks = [Mark::Loaded, Mark::Filled, Mark::Current, Mark::Waits].map(|mark| self.chunks.has(key, mark));
-            assert_eq!(marks, entry.marks(), "{key:?}");
+            assert_eq!(self.chunks.marks(key), entry.marks(), "{key:?}");
         }
         assert_eq!(self.counts, counts);
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bevy_ecs::entity::Entity;
 use marchless::MeshBuffer;
 
+use super::map::Marks;
 use crate::cover::LeafState;
 use crate::jobs::Ticket;
 use crate::volume::Signs;
@@ -95,10 +96,9 @@ impl Shown {
 }
 
 impl Entry {
-    /// Which [`Mark`](super::map::Mark)s it has, in their order.
-    pub(super) const fn marks(&self) -> [bool; 4] {
+    pub(super) const fn marks(&self) -> Marks {
         let (is_leaf, waits) = (matches!(self.role, Role::Leaf { .. }), self.is_to_be_drawn());
-        [true, self.is_filled(), is_leaf && !waits, waits]
+        Marks { is_loaded: true, is_filled: self.is_filled(), is_current: is_leaf && !waits, waits }
     }
 
     pub(super) const fn is_filled(&self) -> bool {

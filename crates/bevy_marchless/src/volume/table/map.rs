@@ -6,17 +6,17 @@ use marchless::Region;
 use super::entry::Entry;
 use crate::chunk::ChunkKey;
 
-/// What is known of a chunk by a bit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mark {
+/// What is known of a chunk without its entry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Marks {
     /// It has an entry.
-    Loaded,
+    pub(super) is_loaded: bool,
     /// Its samples are resident.
-    Filled,
+    pub(super) is_filled: bool,
     /// It is a leaf, and what is shown of it is up to date.
-    Current,
+    pub(super) is_current: bool,
     /// It is a leaf, and what is shown of it is not up to date.
-    Waits,
+    pub(super) waits: bool,
 }
 
 /// Entries by their chunks, in blocks of 4 × 4 × 4.
@@ -32,8 +32,11 @@ pub(super) struct ChunkMap {
 
 /// Index of an entry: `x + 4·y + 16·z`.
 struct Block {
-    /// A word for each [`Mark`].
-    marks: [u64; 4],
+    /// A word for each of the [`Marks`].
+    loaded: u64,
+    filled: u64,
+    current: u64,
+    waits: u64,
     entries: Box<[Option<Entry>; 64]>,
 }
 
@@ -50,10 +53,17 @@ impl ChunkMap {
         self.blocks.len() * (size_of::<(ChunkKey, Block)>() + size_of::<[Option<Entry>; 64]>())
     }
 
-    /// Whether a chunk has a mark.
-    pub(super) fn has(&self, key: ChunkKey, mark: Mark) -> bool {
+    pub(super) fn marks(&self, key: ChunkKey) -> Marks {
         let (block, place) = place(key);
-        self.blocks.get(&block).is_some_and(|block| block.marks[mark as usize] >> index(place) & 1 == 1)
+        self.blocks.get(&block).map_or(Marks::default(), |block| {
+            let is_set = |word: u64| word >> index(place) & 1 == 1;
+            Marks {
+                is_loaded: is_set(block.loaded),
+                is_filled: is_set(block.filled),
+                is_current: is_set(block.current),
+                waits: is_set(block.waits),
+            }
+        })
     }
 
     pub(super) fn get(&self, key: ChunkKey) -> Option<&Entry> {
@@ -88,7 +98,7 @@ impl ChunkMap {
     /// Adds an entry, and returns the one that was there.
     pub(super) fn insert(&mut self, key: ChunkKey, entry: Entry) -> Option<Entry> {
         let (block, place) = place(key);
-        let new = || Block { marks: [0; 4], entries: Box::new([const { None }; 64]) };
+        let new = || Block { loaded: 0, filled: 0, current: 0, waits: 0, entries: Box::new([const { None }; 64]) };
         let block = self.blocks.entry(block).or_insert_with(new);
         block.mark(index(place), entry.marks());
         let former = block.entries[index(place)].replace(entry);
@@ -100,8 +110,8 @@ impl ChunkMap {
         let (block_key, place) = place(key);
         let block = self.blocks.get_mut(&block_key)?;
         let entry = block.entries[index(place)].take()?;
-        block.mark(index(place), [false; 4]);
-        if block.marks[Mark::Loaded as usize] == 0 {
+        block.mark(index(place), Marks::default());
+        if block.loaded == 0 {
             self.blocks.remove(&block_key);
         }
         self.len -= 1;
@@ -145,7 +155,7 @@ impl ChunkMap {
                     let step = [block_x as i32, block_y as i32, block_z as i32];
                     let position = [0, 1, 2].map(|axis| block.position[axis] + step[axis]);
                     let block = self.blocks.get(&ChunkKey { position, ..block });
-                    *word = block.map_or(0, |block| block.marks[Mark::Filled as usize]);
+                    *word = block.map_or(0, |block| block.filled);
                 }
             }
         }
@@ -166,10 +176,12 @@ impl ChunkMap {
 }
 
 impl Block {
-    fn mark(&mut self, index: usize, marks: [bool; 4]) {
-        for (word, mark) in self.marks.iter_mut().zip(marks) {
-            *word = *word & !(1 << index) | u64::from(mark) << index;
-        }
+    fn mark(&mut self, index: usize, marks: Marks) {
+        let set = |word: &mut u64, mark: bool| *word = *word & !(1 << index) | u64::from(mark) << index;
+        set(&mut self.loaded, marks.is_loaded);
+        set(&mut self.filled, marks.is_filled);
+        set(&mut self.current, marks.is_current);
+        set(&mut self.waits, marks.waits);
     }
 }
 
@@ -261,8 +273,8 @@ mod tests {
             prop_assert_eq!(&found, &plain);
             for key in extent.grown(2, 2).points().map(ChunkKey::finest) {
                 prop_assert_eq!(map.get(key).map(Entry::is_filled), plain.get(&key).copied());
-                prop_assert_eq!(map.has(key, Mark::Loaded), plain.contains_key(&key));
-                prop_assert_eq!(map.has(key, Mark::Filled), plain.get(&key) == Some(&true));
+                prop_assert_eq!(map.marks(key).is_loaded, plain.contains_key(&key));
+                prop_assert_eq!(map.marks(key).is_filled, plain.get(&key) == Some(&true));
             }
             for key in extent.points().map(ChunkKey::finest) {
                 let is_there = |near: ChunkKey| plain.get(&near) == Some(&true) || !extent.contains(near.position);
