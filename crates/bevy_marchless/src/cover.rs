@@ -80,8 +80,10 @@ pub(crate) struct Cover {
 struct Watched {
     view: View,
     borders: Borders,
-    /// Chunks up to so many from the middle have been told; infinite: all.
+    /// So large a part of its radii has been told, from the middle on: 0 at first, 1 for all.
     revealed: f64,
+    /// How many chunks have not been told.
+    hidden: usize,
 }
 
 impl Cover {
@@ -116,24 +118,33 @@ impl Cover {
             return;
         };
         self.drops |= view.samples.is_some();
-        if let Some(old) = old.as_ref().filter(|old| view.has_borders_of(&old.view)) {
-            self.views.insert(id, Watched { view, ..old.clone() });
-            return;
-        }
-        let borders = Borders::of(&view);
-        let (former, revealed) = match &old {
-            Some(old) if view.is_near(&old.view) => (Some(old), old.revealed),
-            _ => (None, 0.0),
+        let old = match old {
+            Some(old) if view.has_borders_of(&old.view) => {
+                self.views.insert(id, Watched { view, ..old });
+                return;
+            }
+            old => old,
         };
+        let borders = Borders::of(&view);
+        let former = old.as_ref().filter(|old| view.is_near(&old.view));
+        let revealed = former.map_or(0.0, |old| old.revealed);
+        let mut hidden = 0;
         match former {
-            Some(old) if revealed.is_infinite() => borders.come(&old.borders, come),
-            Some(old) => Borders::of(&view.within(revealed)).come(&Borders::of(&old.view.within(revealed)), come),
-            None => _ = self.partial.insert(id),
+            Some(old) if revealed >= 1.0 => borders.come(&old.borders, come),
+            Some(old) if revealed > 0.0 => {
+                let now = Borders::of(&view.within(revealed));
+                now.come(&Borders::of(&old.view.within(revealed)), come);
+                hidden = borders.len_beyond(&now);
+            }
+            _ => hidden = borders.len_beyond(&Borders::default()),
+        }
+        if revealed < 1.0 {
+            self.partial.insert(id);
         }
         if let Some(old) = &old {
             borders.go(&old.borders, go);
         }
-        self.views.insert(id, Watched { view, borders, revealed });
+        self.views.insert(id, Watched { view, borders, revealed, hidden });
     }
 
     /// Whether all has been told of what viewers ask for.
@@ -146,24 +157,36 @@ impl Cover {
         self.partial.iter().copied()
     }
 
-    /// Tells one ring more of a view that is revealed in part; a ring is a chunk wide.
+    /// Tells one ring more of a view that is revealed in part.
     pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Wanted)) {
-        let Some(Watched { view, borders, revealed }) = self.views.get_mut(&id) else { return };
+        let Some(Watched { view, borders, revealed, hidden }) = self.views.get_mut(&id) else { return };
         let before = if *revealed > 0.0 { Borders::of(&view.within(*revealed)) } else { Borders::default() };
-        *revealed += 1.0;
-        if *revealed < view.range.longest() {
-            Borders::of(&view.within(*revealed)).come(&before, come);
+        *revealed = view.next_ring(*revealed);
+        if *revealed < 1.0 {
+            let now = Borders::of(&view.within(*revealed));
+            now.come(&before, come);
+            *hidden = borders.len_beyond(&now);
         } else {
-            *revealed = f64::INFINITY;
             borders.come(&before, come);
+            *hidden = 0;
             self.partial.remove(&id);
         }
     }
 
-    /// All chunks of views that are revealed in part.
-    pub(crate) fn partly_revealed(&self, mut take: impl FnMut([i32; 3])) {
-        for watched in self.partial.iter().filter_map(|id| self.views.get(id)) {
-            watched.borders.come(&Borders::default(), |position, _| take(position));
+    /// How many chunks viewers may ask for that have not been told.
+    pub(crate) fn hidden(&self) -> usize {
+        self.partial.iter().filter_map(|id| Some(self.views.get(id)?.hidden)).sum()
+    }
+
+    /// The chunks in range that have not been told; some of them twice.
+    pub(crate) fn hidden_in_range(&self, mut take: impl FnMut([i32; 3])) {
+        for Watched { view, borders, revealed, .. } in self.partial.iter().filter_map(|id| self.views.get(id)) {
+            let told = if *revealed > 0.0 { Borders::of(&view.within(*revealed)) } else { Borders::default() };
+            borders.come(&told, |position, wanted| {
+                if wanted == Wanted::Mesh {
+                    take(position);
+                }
+            });
         }
     }
 

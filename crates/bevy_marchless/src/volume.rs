@@ -237,7 +237,7 @@ impl Heart {
         let counts = self.table.counts();
         let is_coming = |key: &ChunkKey| !self.table.is_leaf(*key) && self.cover.contains(key.position);
         let mut coming: HashSet<ChunkKey> = self.arriving.iter().filter(is_coming).collect();
-        self.cover.partly_revealed(|position| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming)));
+        self.cover.hidden_in_range(|position| coming.extend(Some(ChunkKey::finest(position)).filter(is_coming)));
         Coverage { waiting: counts.waiting + coming.len(), empty: counts.empty, drawn: counts.drawn }
     }
 
@@ -277,7 +277,7 @@ impl Heart {
 
     /// How many chunks in range, or beside it, nobody has looked at yet.
     pub(crate) fn waiting_to_come(&self) -> usize {
-        self.arriving.len()
+        self.arriving.len() + self.cover.hidden()
     }
 
     /// Changes what a viewer sees; `None`: it is gone.

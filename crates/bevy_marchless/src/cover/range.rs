@@ -6,6 +6,9 @@ use marchless::Region;
 
 use super::rows::Rows;
 
+/// A view is revealed in this many rings at most.
+const MOST_RINGS: u32 = 64;
+
 /// Chunks: a box, or those that an ellipsoid reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
@@ -213,19 +216,41 @@ impl View {
         }
     }
 
-    /// As much of it as lies within so many chunks from the middle, along the longest axis.
+    /// The same view with so large a part of its radii.
     #[must_use]
-    pub(super) fn within(&self, chunks: f64) -> Self {
-        let factor = chunks / self.range.longest().max(chunks);
-        let samples = self.samples.map(|samples| samples.shrunk(factor));
-        Self::new(self.range.shrunk(factor), self.margin, samples, self.forward)
+    pub(super) fn within(&self, part: f64) -> Self {
+        let samples = self.samples.map(|samples| samples.shrunk(part));
+        Self::new(self.range.shrunk(part), self.margin, samples, self.forward)
+    }
+
+    /// The part of its radii that reaches about a chunk farther than `part`; 1: to the end of all that there is of it.
+    pub(super) fn next_ring(&self, part: f64) -> f64 {
+        let Range { middle, radii, .. } = self.range;
+        let there = self.range.grown(0.0).bounds();
+        if there.is_empty() {
+            return 1.0;
+        }
+        // How far the nearest and the farthest points of what there is lie from the middle, in radii.
+        let [nearest, farthest] = [false, true].map(|is_farthest| {
+            let squares = (0..3).map(|axis| {
+                let ends = [there.min[axis], there.max[axis]].map(|end| f64::from(end) - middle[axis]);
+                let nearest = 0.0f64.clamp(ends[0], ends[1]).abs();
+                let distance = if is_farthest { ends[0].abs().max(ends[1].abs()) } else { nearest };
+                (distance / radii[axis]).powi(2)
+            });
+            squares.sum::<f64>().sqrt().min(1.0)
+        });
+        let size = there.size().into_iter().max().unwrap_or(1);
+        let rings = f64::from((size / 2).clamp(1, MOST_RINGS));
+        let next = part.max(nearest) + (farthest - nearest) / rings;
+        if next < farthest { next.max(f64::MIN_POSITIVE) } else { 1.0 }
     }
 
     /// Whether it differs from another one by a few steps of a viewer, so that few chunks differ.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 2.0);
         let are_near = |a: &Range, b: &Range| {
-            near(a.middle, b.middle) && a.radii == b.radii && (a.is_box, a.extent) == (b.is_box, b.extent)
+            near(a.middle, b.middle) && near(a.radii, b.radii) && (a.is_box, a.extent) == (b.is_box, b.extent)
         };
         let have_near_samples = match (&self.samples, &other.samples) {
             (Some(samples), Some(other)) => are_near(samples, other),
@@ -308,6 +333,24 @@ mod tests {
             prop_assert!(neighbours.is_subset(&grown));
             // Where the extent cuts the range, chunks beyond it may have been the neighbours.
             prop_assert!(!plain.is_empty() || grown.len() <= EXTENT.points().count());
+        }
+
+        #[test]
+        fn few_rings_reveal_any_view(
+            middle in prop::array::uniform3(prop_oneof![-9.0..9.0f64, -1e30..1e30f64, Just(1e300)]),
+            radii in prop::array::uniform3(prop_oneof![0.1..9.0f64, 0.1..1e9f64]),
+            range in range(),
+            is_ellipsoid: bool,
+        ) {
+            let range = if is_ellipsoid { Range::ellipsoid(middle, radii, EXTENT) } else { range };
+            let view = View::new(range, 1.0, None, [0.0; 3]);
+            let (mut part, mut rings) = (0.0, 0);
+            while part < 1.0 {
+                let next = view.next_ring(part);
+                prop_assert!(next > part);
+                (part, rings) = (next, rings + 1);
+            }
+            prop_assert!(rings <= MOST_RINGS + 1, "{} rings", rings);
         }
 
         #[test]

@@ -30,6 +30,11 @@ impl Rows {
         })
     }
 
+    /// How many chunks they hold.
+    fn len(&self) -> usize {
+        self.spans.iter().map(|[start, end]| (end - start).max(0) as usize).sum()
+    }
+
     /// The rows of a z, from their first y on.
     fn layer(&self, z: i32) -> &[[i32; 2]] {
         let index = z.checked_sub(self.from[1]).and_then(|index| usize::try_from(index).ok());
@@ -105,6 +110,11 @@ impl Borders {
         if self.samples.is_some() || old.samples.is_some() {
             self.samples_wanted().difference(old.samples_wanted(), None, &mut take);
         }
+    }
+
+    /// How many of the chunks, those around the drawn ones included, others do not have that lie within these.
+    pub(super) fn len_beyond(&self, others: &Self) -> usize {
+        self.around.len().saturating_sub(others.around.len())
     }
 
     /// The chunks of which less may be wanted than with `old` borders, and how much at most.

@@ -108,7 +108,7 @@ impl Heart {
             let waits =
                 |key: &ChunkKey| table.contains(*key) || cover.wanted(key.position, Wanted::Samples) > Wanted::Gone;
             let next = arriving.pop(cover, waits);
-            if next.is_some() || !self.reveal(until) {
+            if next.is_some() || Instant::now() >= until || !self.reveal(until) {
                 return next;
             }
         }
@@ -142,8 +142,10 @@ impl Heart {
     /// Loads neighbours of a leaf that stays for the margin's sake alone, where they went before the viewer came back: nobody
     /// else would, and edits of the chunk would wait for them for ever.
     fn load_lost_neighbours(&mut self, key: ChunkKey, extent: Region, stats: &mut TerrainStats) {
-        if !self.table.lacks_samples(key) || self.cover.contains(key.position) {
-            return; // What a chunk in range lacks comes anyway.
+        // What a chunk in range lacks comes anyway, once it has been told.
+        let comes = self.cover.is_revealed() && self.cover.contains(key.position);
+        if comes || !self.table.lacks_samples(key) {
+            return;
         }
         for near in key.around().filter(|near| extent.contains(near.position)) {
             let wanted = self.cover.wanted(near.position, Wanted::Samples);
