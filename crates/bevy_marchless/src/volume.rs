@@ -175,11 +175,12 @@ impl Heart {
     }
 
     /// Whether all chunks that were there when the present source began have been shown with it, and some chunk if there is
-    /// any, so that the next may begin.
+    /// any to show, so that the next may begin.
     pub(crate) fn is_generation_shown(&self) -> bool {
         let counts = self.table.counts();
         let may_show = self.table.makes_meshes() && counts.waiting + counts.empty + counts.drawn > 0;
-        counts.outdated == 0 && (self.has_shown || !may_show)
+        // Chunks whose entities the game has despawned count as empty, and are shown no more.
+        counts.outdated == 0 && (self.has_shown || !may_show || self.is_settled())
     }
 
     pub(crate) const fn samples(&self) -> &Samples {

@@ -376,3 +376,19 @@ proptest! {
         game.settle();
     }
 }
+
+#[test]
+fn another_source_comes_after_the_game_has_despawned_all_there_was() {
+    let mut game = Game::new();
+    game.happen(&Event::View { viewer: 0, view: Some(([-1.7, 0.7, -0.4], 0.2, 0.0, None)) });
+    game.settle();
+    while !game.screen.is_empty() {
+        game.happen(&Event::Despawn { index: 0 });
+    }
+    for shift in [1.0, 2.0] {
+        let before = game.heart.samples().generation();
+        game.happen(&Event::Source { shift });
+        assert_ne!(game.heart.samples().generation(), before);
+        game.settle();
+    }
+}
