@@ -86,6 +86,13 @@ struct Watched {
     hidden: usize,
 }
 
+impl Watched {
+    /// The borders of what has been told.
+    fn told(&self) -> Borders {
+        if self.revealed > 0.0 { Borders::of(&self.view.within(self.revealed)) } else { Borders::default() }
+    }
+}
+
 impl Cover {
     /// What one viewer sees.
     pub(crate) fn view(&self, id: ViewId) -> Option<&View> {
@@ -133,7 +140,7 @@ impl Cover {
             Some(old) if revealed >= 1.0 => borders.come(&old.borders, come),
             Some(old) if revealed > 0.0 => {
                 let now = Borders::of(&view.within(revealed));
-                now.come(&Borders::of(&old.view.within(revealed)), come);
+                now.come(&old.told(), come);
                 hidden = borders.len_beyond(&now);
             }
             _ => hidden = borders.len_beyond(&Borders::default()),
@@ -159,16 +166,16 @@ impl Cover {
 
     /// Tells one ring more of a view that is revealed in part.
     pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Wanted)) {
-        let Some(Watched { view, borders, revealed, hidden }) = self.views.get_mut(&id) else { return };
-        let before = if *revealed > 0.0 { Borders::of(&view.within(*revealed)) } else { Borders::default() };
-        *revealed = view.next_ring(*revealed);
-        if *revealed < 1.0 {
-            let now = Borders::of(&view.within(*revealed));
+        let Some(watched) = self.views.get_mut(&id) else { return };
+        let before = watched.told();
+        watched.revealed = watched.view.next_ring(watched.revealed);
+        if watched.revealed < 1.0 {
+            let now = watched.told();
             now.come(&before, come);
-            *hidden = borders.len_beyond(&now);
+            watched.hidden = watched.borders.len_beyond(&now);
         } else {
-            borders.come(&before, come);
-            *hidden = 0;
+            watched.borders.come(&before, come);
+            watched.hidden = 0;
             self.partial.remove(&id);
         }
     }
@@ -178,11 +185,10 @@ impl Cover {
         self.partial.iter().filter_map(|id| Some(self.views.get(id)?.hidden)).sum()
     }
 
-    /// The chunks in range that have not been told; some of them twice.
+    /// The chunks in range that have not been told.
     pub(crate) fn hidden_in_range(&self, mut take: impl FnMut([i32; 3])) {
-        for Watched { view, borders, revealed, .. } in self.partial.iter().filter_map(|id| self.views.get(id)) {
-            let told = if *revealed > 0.0 { Borders::of(&view.within(*revealed)) } else { Borders::default() };
-            borders.come(&told, |position, wanted| {
+        for watched in self.partial.iter().filter_map(|id| self.views.get(id)) {
+            watched.borders.come(&watched.told(), |position, wanted| {
                 if wanted == Wanted::Mesh {
                     take(position);
                 }

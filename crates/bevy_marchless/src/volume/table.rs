@@ -1,5 +1,6 @@
 //! [`ChunkTable`]: every loaded chunk of a terrain, and how far it is.
 
+mod ask;
 mod entry;
 mod map;
 
@@ -11,7 +12,7 @@ use marchless::{MeshBuffer, Region};
 
 pub(crate) use entry::{Counts, Drawn, Shown};
 use entry::{Entry, Fill, Role};
-use map::{ChunkMap, Marks};
+use map::ChunkMap;
 
 use super::Signs;
 use crate::chunk::ChunkKey;
@@ -76,151 +77,6 @@ impl ChunkTable {
         self.makes_meshes
     }
 
-    pub(crate) const fn counts(&self) -> Counts {
-        self.counts
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.chunks.len()
-    }
-
-    /// How much memory it takes, in bytes.
-    pub(super) fn bytes(&self) -> usize {
-        self.chunks.bytes()
-    }
-
-    pub(crate) fn keys(&self) -> impl Iterator<Item = ChunkKey> + '_ {
-        self.chunks.iter().map(|(key, _)| key)
-    }
-
-    pub(crate) fn contains(&self, key: ChunkKey) -> bool {
-        self.chunks.marks(key).is_loaded
-    }
-
-    /// What there is of a chunk, as the cover sees it: a leaf that has not been drawn is no more than its samples.
-    pub(super) fn kept(&self, key: ChunkKey) -> Wanted {
-        match self.chunks.get(key) {
-            None => Wanted::Gone,
-            Some(Entry { role: Role::Leaf { shown, .. }, .. }) if !matches!(shown, Shown::Nothing) => Wanted::Mesh,
-            Some(_) => Wanted::Samples,
-        }
-    }
-
-    pub(super) fn is_leaf(&self, key: ChunkKey) -> bool {
-        let Marks { is_current, waits, .. } = self.chunks.marks(key);
-        is_current || waits
-    }
-
-    /// What is shown of a leaf.
-    pub(super) fn shown(&self, key: ChunkKey) -> Option<&Shown> {
-        match &self.chunks.get(key)?.role {
-            Role::Support => None,
-            Role::Leaf { shown, .. } => Some(shown),
-        }
-    }
-
-    /// The mesh of a chunk, and its entity.
-    pub(crate) fn drawn(&self, key: ChunkKey) -> Option<&Drawn> {
-        match self.shown(key)? {
-            Shown::Mesh(drawn) => Some(drawn),
-            _ => None,
-        }
-    }
-
-    pub(super) fn leaf_state(&self, key: ChunkKey) -> Option<LeafState> {
-        self.shown(key).map(Shown::state)
-    }
-
-    /// Whether something is shown of a chunk, if only that it is empty.
-    pub(super) fn is_shown(&self, key: ChunkKey) -> bool {
-        self.shown(key).is_some_and(|shown| !matches!(shown, Shown::Nothing))
-    }
-
-    /// Whether a chunk has its samples.
-    pub(super) fn is_filled(&self, key: ChunkKey) -> bool {
-        self.chunks.marks(key).is_filled
-    }
-
-    /// Whether a chunk is to be filled.
-    pub(super) fn is_queued(&self, key: ChunkKey) -> bool {
-        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Queued))
-    }
-
-    /// Whether nobody has seen to a chunk's samples.
-    pub(super) fn is_unasked(&self, key: ChunkKey) -> bool {
-        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Unasked))
-    }
-
-    pub(super) fn is_dropped(&self, key: ChunkKey) -> bool {
-        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Dropped))
-    }
-
-    /// Whether a chunk waits for the result of this job.
-    pub(super) fn is_asked(&self, key: ChunkKey, job: u64) -> bool {
-        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(number, _) if number == job))
-    }
-
-    /// Whether samples of a chunk, or some around it, are missing.
-    pub(super) fn lacks_samples(&self, key: ChunkKey) -> bool {
-        self.contains(key) && !self.is_surrounded(key)
-    }
-
-    /// Whether a chunk is a leaf that can be drawn.
-    pub(super) fn can_be_drawn(&self, key: ChunkKey) -> bool {
-        self.chunks.get(key).is_some_and(Entry::may_be_drawn) && self.is_surrounded(key)
-    }
-
-    /// Whether a chunk can be drawn, and what is shown is not up to date.
-    pub(super) fn is_ready(&self, key: ChunkKey) -> bool {
-        self.makes_meshes && self.chunks.marks(key).waits && self.is_surrounded(key)
-    }
-
-    /// Whether a leaf waits for samples around it.
-    pub(super) fn waits_for_samples(&self, key: ChunkKey) -> bool {
-        self.chunks.marks(key).waits && !self.is_surrounded(key)
-    }
-
-    /// Whether a chunk and all around it have their samples, as far as there are any.
-    fn is_surrounded(&self, key: ChunkKey) -> bool {
-        self.chunks.is_surrounded(key, &self.extent)
-    }
-
-    /// Whether a chunk is as far as it gets if no more is wanted than this.
-    pub(super) fn has_all(&self, key: ChunkKey, wanted: Wanted) -> bool {
-        let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
-        if wanted == Wanted::Mesh { is_current } else { is_loaded && !waits }
-    }
-
-    /// Whether there is more of a chunk than this.
-    pub(super) fn has_more(&self, key: ChunkKey, most: Wanted) -> bool {
-        let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
-        match most {
-            Wanted::Gone => is_loaded,
-            Wanted::Samples => is_current || waits,
-            Wanted::Mesh => false,
-        }
-    }
-
-    /// Whether what is shown of a chunk is up to date, as far as is known without looking at groups.
-    pub(super) fn is_current(&self, key: ChunkKey) -> bool {
-        self.chunks.get(key).is_some_and(|entry| match &entry.role {
-            Role::Leaf { shown, is_stale } => !is_stale && !matches!(shown, Shown::Nothing),
-            Role::Support => false,
-        })
-    }
-
-    /// Whether a chunk is known to have no surface at an isovalue.
-    pub(super) fn is_without_surface(&self, key: ChunkKey, isovalue: f32) -> bool {
-        let signs = |key: ChunkKey| self.chunks.get(key).map(|entry| entry.signs.at(isovalue));
-        let ChunkKey { level, position } = key;
-        signs(key).is_some_and(|own| {
-            own.are_without_surface(|step| {
-                let position = [0, 1, 2].map(|axis| position[axis].saturating_add(step[axis]));
-                signs(ChunkKey { level, position })
-            })
-        })
-    }
-
     /// The next of the chunks that can be drawn and are not up to date.
     pub(super) fn next_ready(&mut self) -> Option<ChunkKey> {
         while let Some(key) = self.ready.pop() {
@@ -242,14 +98,6 @@ impl ChunkTable {
 
     pub(crate) fn released_len(&self) -> usize {
         self.released.len()
-    }
-
-    /// All entities that something is shown on.
-    pub(crate) fn entities(&self) -> impl Iterator<Item = (ChunkKey, Entity)> + '_ {
-        self.chunks.iter().filter_map(|(key, entry)| match &entry.role {
-            Role::Leaf { shown: Shown::Mesh(drawn), .. } => Some((key, drawn.entity)),
-            _ => None,
-        })
     }
 
     /// A chunk came into range.
