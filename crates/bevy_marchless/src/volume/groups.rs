@@ -184,10 +184,13 @@ impl Groups {
         gives_way
     }
 
-    /// Withdraws the group that works on a chunk if it gives way.
+    /// A chunk is to be drawn no longer: withdraws the group that works on it if it gives way, or takes the chunk out of it. If
+    /// it comes back, its samples may be newer than the group's.
     pub(super) fn withdraw_from(&mut self, key: ChunkKey) {
-        if let Some(id) = self.claims.get(&key) {
-            self.withdraw(*id);
+        let Some(id) = self.claims.get(&key).copied() else { return };
+        if !self.withdraw(id) {
+            self.claims.remove(&key);
+            self.running.entry(id).and_modify(|group| _ = group.chunks.remove(&key));
         }
     }
 

@@ -215,7 +215,8 @@ impl Heart {
     /// Shows all chunks of a complete group.
     pub(crate) fn show(&mut self, group: Group) -> Shown {
         let Group { chunks, snapshot, look, since, meshed, .. } = group;
-        let swaps = meshed.into_iter().map(|meshed| self.swap(meshed, look)).collect();
+        let is_left = |meshed: &Meshed| chunks.contains(&ChunkKey::finest(meshed.position));
+        let swaps = meshed.into_iter().filter(is_left).map(|meshed| self.swap(meshed, look)).collect();
         for (position, chunk) in snapshot {
             let key = ChunkKey::finest(position);
             if self.table.contains(key) && (chunks.contains(&key) || !self.table.is_shown(key)) {
