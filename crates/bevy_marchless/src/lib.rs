@@ -31,8 +31,8 @@
 //! [`Chunk`](chunk::Chunk) entities, its children, mirror what is drawn. All chunks that an edit changes are
 //! meshed from one snapshot and shown in one update, a small edit in the update that reads its stamp. A
 //! [`TerrainQuery`](query::TerrainQuery) tells what a ray hits. Everything runs in `PostUpdate`
-//! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame. What games add to
-//! chunks belongs in [`MarchlessSystems::Decorate`](schedule::MarchlessSystems::Decorate).
+//! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame. How
+//! chunks get components of a game's own, module [`inherit`] tells.
 //!
 //! # What is guaranteed
 //! - The same stamps in the same order give the same samples, bit for bit, on any machine, whatever the threads do and
@@ -61,6 +61,7 @@ mod budget;
 pub mod chunk;
 mod cover;
 pub mod debug;
+pub mod inherit;
 mod jobs;
 #[cfg(feature = "pbr")]
 pub mod material;
@@ -89,6 +90,7 @@ pub mod prelude {
     pub use crate::debug::DebugPlugin;
     #[cfg(feature = "gizmos")]
     pub use crate::debug::ShowChunkBounds;
+    pub use crate::inherit::ChunkComponentPlugin;
     #[cfg(feature = "pbr")]
     pub use crate::material::TerrainMaterialPlugin;
     pub use crate::mesh::ChunkSamples;
@@ -115,6 +117,7 @@ plugin_group! {
         bits:::BitsPlugin,
         brush:::BrushPlugin,
         mesh:::MeshingPlugin,
+        inherit:::InheritPlugin,
         #[cfg(feature = "pbr")]
         material:::MaterialPlugin,
         #[cfg(feature = "big_space")]

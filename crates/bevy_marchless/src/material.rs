@@ -9,12 +9,13 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::resource::IsResource;
 use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
 
-use crate::chunk::Chunk;
+use crate::inherit::ChunkComponentPlugin;
 use crate::mesh::ChunkSamples;
-use crate::schedule::{MarchlessSystems, Phase};
+use crate::schedule::Phase;
 use crate::terrain::Terrain;
 
-/// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes.
+/// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes, as [`ChunkComponentPlugin`] does, and has
+/// no plain material given to what has one of this type.
 ///
 /// [`MaterialPlugin`] adds it for [`StandardMaterial`]; add it for each other type of material that terrains have.
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<M>);
@@ -30,9 +31,7 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
         let component = app.world_mut().register_component::<MeshMaterial3d<M>>();
         app.init_resource::<MaterialTypes>();
         app.world_mut().resource_mut::<MaterialTypes>().0.push(component);
-        app.add_observer(take_away_material::<M>)
-            .add_observer(give_material::<M>)
-            .add_systems(PostUpdate, hand_on_material::<M>.in_set(MarchlessSystems::Decorate));
+        app.add_plugins(ChunkComponentPlugin::<MeshMaterial3d<M>>::default());
     }
 }
 
@@ -88,46 +87,5 @@ fn take_away_plain_material(
 ) {
     if plain.contains(removed.entity) {
         commands.entity(removed.entity).try_remove::<(MeshMaterial3d<StandardMaterial>, PlainMaterial)>();
-    }
-}
-
-/// A new chunk gets its terrain's material as soon as it is there: without one it would not be drawn.
-fn give_material<M: Material>(
-    added: On<Add, Chunk>,
-    chunks: Query<&Chunk>,
-    terrains: Query<&MeshMaterial3d<M>, With<Terrain>>,
-    mut commands: Commands,
-) {
-    if let Ok(chunk) = chunks.get(added.entity)
-        && let Ok(material) = terrains.get(chunk.terrain)
-    {
-        commands.entity(added.entity).try_insert(MeshMaterial3d(material.0.clone()));
-    }
-}
-
-/// Gives the chunks of terrains their new material.
-fn hand_on_material<M: Material>(
-    changed: Query<(&MeshMaterial3d<M>, &Children), (Changed<MeshMaterial3d<M>>, With<Terrain>)>,
-    chunks: Query<Entity, With<Chunk>>,
-    mut commands: Commands,
-) {
-    for (material, children) in &changed {
-        for chunk in chunks.iter_many(children) {
-            commands.entity(chunk).try_insert(MeshMaterial3d(material.0.clone()));
-        }
-    }
-}
-
-/// Chunks lose their material when their terrain does.
-fn take_away_material<M: Material>(
-    removed: On<Remove, MeshMaterial3d<M>>,
-    terrains: Query<&Children, With<Terrain>>,
-    chunks: Query<Entity, With<Chunk>>,
-    mut commands: Commands,
-) {
-    if let Ok(children) = terrains.get(removed.entity) {
-        for chunk in chunks.iter_many(children) {
-            commands.entity(chunk).try_remove::<MeshMaterial3d<M>>();
-        }
     }
 }

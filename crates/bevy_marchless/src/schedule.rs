@@ -37,7 +37,7 @@ pub enum MarchlessSystems {
     /// written in it, and meshes shown.
     Work,
     /// In `Work`, once the update's new chunks are there: the place for what adds to them, so that it is there before they
-    /// are first drawn.
+    /// are first drawn; see module [`inherit`](crate::inherit).
     Decorate,
 }
 
