@@ -25,7 +25,7 @@ use bevy_tasks::AsyncComputeTaskPool;
 use marchless::MeshBuffer;
 
 pub use handmade::{ChunkSamples, ChunkSamplesError};
-use job::{mesh_chunk, mesh_now, recolor};
+use job::{AssetStyle, mesh_chunk, mesh_now, recolor};
 use rooms::MeshRooms;
 
 use crate::budget::{ENTITY_TIME, FrameBudget, Share};
@@ -34,7 +34,7 @@ use crate::jobs::{Priority, WorkQueue};
 use crate::schedule::{MakesMeshes, MarchlessSettings, Phase};
 use crate::stats::TerrainStats;
 use crate::terrain::TerrainVolume;
-use crate::volume::{Drawn, Heart, MeshResult, Meshed, Place, Prepared, Restyle, Restyled, Shown, Swap};
+use crate::volume::{Colors, Drawn, Heart, MeshResult, Meshed, Place, Prepared, Restyle, Restyled, Shown, Swap};
 
 /// The number of a vertex's material, a `u32`, for shaders.
 pub const ATTRIBUTE_MATERIAL: MeshVertexAttribute =
@@ -64,10 +64,17 @@ struct Screen<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
     rooms: Res<'w, MeshRooms>,
+    settings: Res<'w, MarchlessSettings>,
     stats: ResMut<'w, TerrainStats>,
 }
 
 impl Screen<'_, '_> {
+    /// What the assets of meshes in these colours are like; `None` where there are no assets.
+    fn style(&self, colors: &Colors) -> Option<AssetStyle> {
+        let usages = self.settings.mesh_usages;
+        self.assets.is_some().then(|| AssetStyle { colors: colors.clone(), usages })
+    }
+
     /// Gives an entity its new mesh, which may be empty. `cells`: the chunk's size, whose box bounds an empty mesh.
     fn show(&mut self, entity: Entity, meshed: Meshed, cells: [u32; 3]) {
         let bounds = mesh_bounds(&meshed.geometry, cells);
@@ -101,12 +108,12 @@ impl Screen<'_, '_> {
 fn mesh_terrains(
     mut volumes: Query<(Entity, &mut TerrainVolume)>,
     queue: Res<WorkQueue>,
-    settings: Res<MarchlessSettings>,
     mut budget: ResMut<FrameBudget>,
     mut screen: Screen,
 ) {
     let start = Instant::now();
     let threads = AsyncComputeTaskPool::try_get().map_or(1, |pool| pool.thread_num().max(1));
+    let settings = *screen.settings;
     let mut update = Update {
         queue: &queue,
         screen: &mut screen,
@@ -218,18 +225,18 @@ impl Update<'_, '_, '_> {
 
     /// Gives chunks another look, one by one.
     fn restyle(&mut self, drawing: &mut Drawing) {
-        let assets = self.screen.assets.is_some();
+        let style = self.screen.style(drawing.heart.colors());
         let mut done = 0;
         while (done == 0 || Instant::now() < self.until)
-            && let Some(restyle) = drawing.heart.next_restyle(self.in_flight, assets)
+            && let Some(restyle) = drawing.heart.next_restyle(self.in_flight, style.is_some())
         {
             match restyle {
                 Restyle::Mesh(prepared) => self.start_jobs(drawing, prepared, Priority::Restyle),
                 Restyle::Recolor(key, group, geometry) => {
-                    let (results, colors) = (drawing.heart.meshed().clone(), drawing.heart.colors().clone());
+                    let (results, style) = (drawing.heart.meshed().clone(), style.clone());
                     drawing.heart.start_recolor(group, |id| {
                         self.queue.push(Priority::Restyle, move || {
-                            results.push(MeshResult::OfGroup(id, recolor(key.position, geometry, &colors)));
+                            results.push(MeshResult::OfGroup(id, recolor(key.position, geometry, style.as_ref())));
                         })
                     });
                 }
@@ -248,10 +255,10 @@ impl Update<'_, '_, '_> {
             && let Some((key, job, settings)) = drawing.heart.next_in_transition(self.in_flight)
         {
             let samples = drawing.heart.samples().neighbourhood(key.position).to_neighbourhood();
-            let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+            let style = self.screen.style(drawing.heart.colors());
             let (results, look) = (drawing.heart.meshed().clone(), drawing.heart.look());
             let ticket = self.queue.push(Priority::Restyle, move || {
-                let meshed = mesh_chunk(&samples.view(), key.position, &settings, colors.as_ref(), None);
+                let meshed = mesh_chunk(&samples.view(), key.position, &settings, style.as_ref(), None);
                 results.push(MeshResult::Restyled(Restyled { job, meshed, look }));
             });
             drawing.heart.started_in_transition(key, job, ticket);
@@ -261,10 +268,10 @@ impl Update<'_, '_, '_> {
 
     /// Meshes what is missing for the other isovalue, and shows it.
     fn end_transition(&mut self, drawing: &mut Drawing) {
-        let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+        let style = self.screen.style(drawing.heart.colors());
         while let Some((key, _, settings)) = drawing.heart.next_in_transition(usize::MAX) {
             let samples = [(key.position, drawing.heart.samples().neighbourhood(key.position))];
-            let meshed = mesh_now(&samples, &settings, colors.as_ref(), &self.screen.rooms);
+            let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.screen.rooms);
             for meshed in meshed {
                 self.screen.stats.count_mesh(meshed.time);
                 drawing.heart.meshed_in_transition(meshed);
@@ -283,14 +290,14 @@ impl Update<'_, '_, '_> {
         }
         self.inline_left -= count;
         let (settings, mut group) = (drawing.heart.mesh_settings(), prepared.group);
-        let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+        let style = self.screen.style(drawing.heart.colors());
         let samples: Vec<_> = prepared
             .to_mesh
             .iter()
             .map(|position| (*position, drawing.heart.samples().neighbourhood(*position)))
             .collect();
-        let meshed = mesh_now(&samples, &settings, colors.as_ref(), &self.screen.rooms);
-        self.screen.rooms.prepare(meshed.iter().map(|meshed| &*meshed.geometry), colors.is_some());
+        let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.screen.rooms);
+        self.screen.rooms.prepare(meshed.iter().map(|meshed| &*meshed.geometry), style.is_some());
         for meshed in meshed {
             self.screen.stats.count_mesh(meshed.time);
             group.push(meshed);
@@ -306,12 +313,12 @@ impl Update<'_, '_, '_> {
             return self.show(drawing, shown);
         }
         let (results, settings) = (drawing.heart.meshed().clone(), drawing.heart.mesh_settings());
-        let colors = self.screen.assets.is_some().then(|| drawing.heart.colors().clone());
+        let style = self.screen.style(drawing.heart.colors());
         drawing.heart.start(prepared, |heart, id, position| {
             let samples = heart.samples().neighbourhood(position).to_neighbourhood();
-            let (results, colors) = (results.clone(), colors.clone());
+            let (results, style) = (results.clone(), style.clone());
             self.queue.push(priority, move || {
-                let meshed = mesh_chunk(&samples.view(), position, &settings, colors.as_ref(), None);
+                let meshed = mesh_chunk(&samples.view(), position, &settings, style.as_ref(), None);
                 results.push(MeshResult::OfGroup(id, meshed));
             })
         });

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use bevy_app::{App, Plugin, PostUpdate};
-use bevy_asset::AssetEventSystems;
+use bevy_asset::{AssetEventSystems, RenderAssetUsages};
 use bevy_ecs::prelude::*;
 use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
@@ -82,6 +82,10 @@ pub struct MarchlessSettings {
     /// what they need beside it; streaming holds back for them in one of five updates at most. Default: six tenths of a
     /// millisecond.
     pub main_thread: Duration,
+    /// Where the [`Mesh`](bevy_mesh::Mesh) assets of chunks are kept; counts for meshes made from then on. Default:
+    /// `RENDER_WORLD` alone, which frees the main world's copy once it has been uploaded. With `MAIN_WORLD` too, mesh ray casts,
+    /// picking and other crates' colliders can read them, at the cost of that memory. Without `RENDER_WORLD`, nothing is drawn.
+    pub mesh_usages: RenderAssetUsages,
     /// Without threads: how many chunks may be sampled or meshed per update, on the main thread; `Some(0)` lets them all
     /// wait, and only what `inline_chunks` allows is meshed. `None`: in tasks,
     /// as many at once as the pool of asynchronous tasks has threads. Default: 8 on the web, `None` elsewhere; also 8 where there is no such pool.
@@ -95,6 +99,7 @@ impl Default for MarchlessSettings {
             chunks_in_flight: 64,
             upload_bytes: 4 << 20,
             main_thread: Duration::from_micros(600),
+            mesh_usages: RenderAssetUsages::RENDER_WORLD,
             budget: cfg!(target_arch = "wasm32").then_some(8),
         }
     }

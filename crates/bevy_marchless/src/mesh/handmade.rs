@@ -17,7 +17,6 @@ use super::Screen;
 use super::job::mesh_with;
 use crate::chunk::ChunkGeometry;
 use crate::jobs::{Priority, Results, Ticket, WorkQueue};
-use crate::schedule::MarchlessSettings;
 use crate::terrain::Palette;
 use crate::volume::Meshed;
 
@@ -111,10 +110,10 @@ impl ChunkSamples {
     }
 
     /// The job that meshes the samples as they are now.
-    fn mesh_job(&self, wants_asset: bool) -> impl FnOnce() -> Meshed + Send + 'static {
+    fn mesh_job(&self, screen: &Screen) -> impl FnOnce() -> Meshed + Send + 'static {
         let data = self.data.clone();
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
-        let colors = wants_asset.then(|| Arc::new(self.palette.to_vertex_colors()));
+        let style = screen.style(&Arc::new(self.palette.to_vertex_colors()));
         move || {
             let zeros;
             let materials = if data.materials.is_empty() {
@@ -126,7 +125,7 @@ impl ChunkSamples {
             let samples = Samples::new(data.shape, &data.weights)
                 .and_then(|samples| samples.with_materials(materials))
                 .expect("the lengths have been checked");
-            mesh_with([0; 3], colors.as_ref(), None, |mesher, _, out| mesher.mesh(samples, &settings, out))
+            mesh_with([0; 3], style.as_ref(), None, |mesher, _, out| mesher.mesh(samples, &settings, out))
         }
     }
 }
@@ -164,10 +163,9 @@ pub(super) struct MeshingState {
 pub(super) fn mesh_samples(
     mut chunks: Query<(Entity, Ref<ChunkSamples>, &mut MeshingState)>,
     queue: Res<WorkQueue>,
-    settings: Res<MarchlessSettings>,
     mut screen: Screen,
 ) {
-    let mut cells_left = settings.inline_chunks.saturating_mul(32 * 32 * 32);
+    let mut cells_left = screen.settings.inline_chunks.saturating_mul(32 * 32 * 32);
     for (entity, samples, mut state) in &mut chunks {
         let changed_at = samples.last_changed();
         if state.seen == Some(changed_at) && !state.changed && state.job.is_none() {
@@ -183,7 +181,7 @@ pub(super) fn mesh_samples(
             continue;
         }
         state.changed = false;
-        let job = samples.mesh_job(screen.assets.is_some());
+        let job = samples.mesh_job(&screen);
         if samples.weights().len() <= cells_left {
             cells_left -= samples.weights().len();
             show(entity, &samples, job(), &mut screen);

@@ -16,30 +16,39 @@ use super::ATTRIBUTE_MATERIAL;
 use super::rooms::{AssetRoom, MeshRoom, MeshRooms};
 use crate::volume::{Colors, Meshed};
 
-/// Meshes a chunk. `colors`: of its vertices; `None` where no asset is wanted. `rooms`: memory for the mesh; without it,
+/// What the asset of a mesh is like.
+#[derive(Clone)]
+pub(crate) struct AssetStyle {
+    /// The colours of its vertices.
+    pub(crate) colors: Colors,
+    /// Where it is kept.
+    pub(crate) usages: RenderAssetUsages,
+}
+
+/// Meshes a chunk. `style`: of its asset; `None` where none is wanted. `rooms`: memory for the mesh; without it,
 /// the mesh takes no more than it needs.
 pub(crate) fn mesh_chunk(
     samples: &NeighbourhoodView<'_>,
     position: [i32; 3],
     settings: &MeshSettings,
-    colors: Option<&Colors>,
+    style: Option<&AssetStyle>,
     rooms: Option<&MeshRooms>,
 ) -> Meshed {
-    mesh_with(position, colors, rooms, |mesher, block, out| samples.mesh(mesher, block, settings, out))
+    mesh_with(position, style, rooms, |mesher, block, out| samples.mesh(mesher, block, settings, out))
 }
 
 /// Meshes chunks at once, with the help of the compute pool where there is one; the result is in the order of positions.
 pub(crate) fn mesh_now(
     chunks: &[([i32; 3], NeighbourhoodView<'_>)],
     settings: &MeshSettings,
-    colors: Option<&Colors>,
+    style: Option<&AssetStyle>,
     rooms: &MeshRooms,
 ) -> Vec<Meshed> {
     let next = AtomicUsize::new(0);
     // Each thread takes the next one when it is free: to wake others for each would take longer.
     let take = || {
         let (position, samples) = chunks.get(next.fetch_add(1, Ordering::Relaxed))?;
-        Some(mesh_chunk(samples, *position, settings, colors, Some(rooms)))
+        Some(mesh_chunk(samples, *position, settings, style, Some(rooms)))
     };
     let Some(pool) = ComputeTaskPool::try_get().filter(|_| chunks.len() > 1) else {
         return iter::from_fn(take).collect();
@@ -57,9 +66,9 @@ pub(crate) fn mesh_now(
 }
 
 /// The same mesh in other colours.
-pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, colors: &Colors) -> Meshed {
+pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, style: Option<&AssetStyle>) -> Meshed {
     let start = Instant::now();
-    let mesh = Some(to_asset(&geometry, colors, AssetRoom::default()));
+    let mesh = style.map(|style| to_asset(&geometry, style, AssetRoom::default()));
     Meshed { position, geometry, mesh, time: start.elapsed() }
 }
 
@@ -67,7 +76,7 @@ pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, colors: &Co
 /// leaves nothing to draw.
 pub(super) fn mesh_with(
     position: [i32; 3],
-    colors: Option<&Colors>,
+    style: Option<&AssetStyle>,
     rooms: Option<&MeshRooms>,
     mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
 ) -> Meshed {
@@ -89,7 +98,7 @@ pub(super) fn mesh_with(
         }
     });
     let MeshRoom { geometry, asset } = room;
-    let mesh = colors.filter(|_| !geometry.is_empty()).map(|colors| to_asset(&geometry, colors, asset));
+    let mesh = style.filter(|_| !geometry.is_empty()).map(|style| to_asset(&geometry, style, asset));
     let geometry = Arc::new(geometry);
     Meshed { position, geometry, mesh, time: start.elapsed() }
 }
@@ -103,23 +112,23 @@ fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {
     to.bounds = *bounds;
 }
 
-/// A mesh for the render world: positions in voxels, colours and materials a vertex, and the indices, in half the bytes
+/// A mesh as an asset: positions in voxels, colours and materials a vertex, and the indices, in half the bytes
 /// where there are few enough vertices.
-fn to_asset(geometry: &MeshBuffer, colors: &Colors, room: AssetRoom) -> Mesh {
+fn to_asset(geometry: &MeshBuffer, style: &AssetStyle, room: AssetRoom) -> Mesh {
     let MeshBuffer { positions, normals, materials, indices, bounds } = geometry;
     let indices = if positions.len() <= usize::from(u16::MAX) {
         Indices::U16(filled(room.indices, indices.iter().map(|&index| index as u16)))
     } else {
         Indices::U32(indices.clone())
     };
-    let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+    let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, style.usages)
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, filled(room.positions, positions.iter().copied()))
         .with_inserted_indices(indices);
     if !normals.is_empty() {
         mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, filled(room.normals, normals.iter().copied()));
     }
     if !materials.is_empty() {
-        let vertex_colors = materials.iter().map(|&material| colors[usize::from(material)]);
+        let vertex_colors = materials.iter().map(|&material| style.colors[usize::from(material)]);
         mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, filled(room.colors, vertex_colors));
         mesh.insert_attribute(ATTRIBUTE_MATERIAL, filled(room.materials, materials.iter().copied().map(u32::from)));
     }
