@@ -1,23 +1,30 @@
 //! [`TerrainQuery`]: what a ray hits, how far away the surface is.
 
-use bevy_app::{App, Plugin};
+mod bounds;
+mod visibility;
+
+use bevy_app::{App, Plugin, PostUpdate};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 use bevy_math::{DVec3, IVec3, Ray3d, Vec3};
 use bevy_reflect::prelude::*;
+use bevy_transform::TransformSystems;
 use marchless::Region;
 
 use crate::chunk::ChunkKey;
 use crate::place::{Place, PlaceItem};
-use crate::terrain::TerrainVolume;
+use crate::terrain::{TerrainVolume, give_to_terrains};
+use visibility::IsHidden;
 
-/// Registers the types of answers; the questions need no plugin.
+/// Registers the types of answers, and notes which terrains are hidden.
 #[derive(Default)]
 pub struct QueryPlugin;
 
 impl Plugin for QueryPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<TerrainHit>();
+        give_to_terrains::<IsHidden>(app);
+        app.register_type::<TerrainHit>()
+            .add_systems(PostUpdate, visibility::note_visibility.after(TransformSystems::Propagate));
     }
 }
 
@@ -40,6 +47,7 @@ impl Plugin for QueryPlugin {
 #[derive(SystemParam)]
 pub struct TerrainQuery<'w, 's> {
     terrains: Query<'w, 's, (Entity, &'static TerrainVolume, Place)>,
+    hidden: Query<'w, 's, &'static IsHidden>,
 }
 
 /// Where a ray hits a terrain.
@@ -63,15 +71,48 @@ pub struct TerrainHit {
 }
 
 impl TerrainQuery<'_, '_> {
-    /// The first triangle that a ray hits, of any terrain and from either side. `max_distance`: in world units.
+    /// The first triangle that a ray hits, of any [visible](Self::is_visible) terrain and from either side.
+    /// `max_distance`: in world units.
     pub fn ray_cast(&self, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
-        let hits = self.terrains.iter().filter_map(|found| cast(found, ray, max_distance));
+        self.ray_cast_where(ray, max_distance, |terrain| self.is_visible(terrain))
+    }
+
+    /// The first triangle that a ray hits, of the terrains that `filter` accepts, hidden ones too. The filter is called only
+    /// for terrains near the ray.
+    ///
+    /// ```
+    /// use bevy_marchless::prelude::*;
+    /// # use bevy_ecs::prelude::*;
+    /// # use bevy_math::Ray3d;
+    ///
+    /// # #[derive(Component)]
+    /// # struct Water;
+    /// /// What a ray hits below the water.
+    /// fn look_through_water(ray: Ray3d, terrains: &TerrainQuery, water: &Query<(), With<Water>>) -> Option<TerrainHit> {
+    ///     let is_ground = |terrain| terrains.is_visible(terrain) && !water.contains(terrain);
+    ///     terrains.ray_cast_where(ray, 500.0, is_ground)
+    /// }
+    /// ```
+    pub fn ray_cast_where(&self, ray: Ray3d, max_distance: f32, filter: impl Fn(Entity) -> bool) -> Option<TerrainHit> {
+        let found = self
+            .terrains
+            .iter()
+            .filter(|(terrain, volume, place)| bounds::may_hit(volume, place, ray, max_distance) && filter(*terrain));
+        let hits = found.filter_map(|found| cast(found, ray, max_distance));
         hits.min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// The same of one terrain.
+    /// The first triangle of one terrain that a ray hits, whether the terrain is visible or hidden.
     pub fn ray_cast_terrain(&self, terrain: Entity, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
         cast(self.terrains.get(terrain).ok()?, ray, max_distance)
+    }
+
+    /// Whether a terrain's `Visibility`, its own or the inherited one, let it be drawn in the latest update. True where it
+    /// has none.
+    ///
+    /// It needs no renderer. The visibility of single chunks does not count.
+    pub fn is_visible(&self, terrain: Entity) -> bool {
+        !self.hidden.get(terrain).is_ok_and(|is_hidden| is_hidden.0)
     }
 
     /// The weight at a position in world space, in voxels, negative inside, with all edits; interpolated between samples.

@@ -5,14 +5,9 @@ mod common;
 use bevy_app::App;
 use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
-use bevy_math::{DVec3, Dir3, Quat, Ray3d, Vec3};
+use bevy_math::{DVec3, Quat, Vec3};
 use bevy_transform::components::Transform;
 use common::*;
-
-fn cast(app: &mut App, origin: Vec3, towards: Vec3, max_distance: f32) -> Option<TerrainHit> {
-    let ray = Ray3d::new(origin, Dir3::new(towards - origin).unwrap());
-    app.world_mut().run_system_once(move |terrains: TerrainQuery| terrains.ray_cast(ray, max_distance)).unwrap()
-}
 
 #[test]
 fn a_ray_hits_a_moved_turned_and_scaled_terrain() {

@@ -12,8 +12,9 @@ use bevy_app::{App, TaskPoolPlugin};
 use bevy_asset::{AssetPlugin, Assets};
 use bevy_color::ColorToComponents as _;
 use bevy_ecs::prelude::*;
+use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
-use bevy_math::{IVec3, UVec3, Vec3};
+use bevy_math::{Dir3, IVec3, Ray3d, UVec3, Vec3};
 use bevy_mesh::{Mesh, Mesh3d, MeshPlugin, VertexAttributeValues};
 use bevy_transform::TransformPlugin;
 use bevy_transform::components::Transform;
@@ -182,6 +183,12 @@ pub fn report(app: &mut App, terrain: Entity) -> MeshReport {
         }
     }
     MeshReport::new(&positions, &indices)
+}
+
+/// What a ray towards a point hits, of all visible terrains.
+pub fn cast(app: &mut App, origin: Vec3, towards: Vec3, max_distance: f32) -> Option<TerrainHit> {
+    let ray = Ray3d::new(origin, Dir3::new(towards - origin).unwrap());
+    app.world_mut().run_system_once(move |terrains: TerrainQuery| terrains.ray_cast(ray, max_distance)).unwrap()
 }
 
 pub fn mesh_assets(app: &App) -> usize {
