@@ -1,6 +1,7 @@
 //! [`TerrainQuery`]: what a ray hits, how far away the surface is.
 
 mod bounds;
+mod transforms;
 mod visibility;
 
 use bevy_app::{App, Plugin, PostUpdate};
@@ -16,21 +17,25 @@ use crate::place::{Place, PlaceItem};
 use crate::terrain::{TerrainVolume, give_to_terrains};
 use visibility::IsHidden;
 
-/// Registers the types of answers, and notes which terrains are hidden.
+/// Registers the types of answers, notes which terrains are hidden, and lets terrains be where their `Transform` says in
+/// apps without `TransformPlugin`.
 #[derive(Default)]
 pub struct QueryPlugin;
 
 impl Plugin for QueryPlugin {
     fn build(&self, app: &mut App) {
+        let keep_transforms = transforms::keep_transforms.run_if(transforms::may_lack_propagation);
         give_to_terrains::<IsHidden>(app);
         app.register_type::<TerrainHit>()
-            .add_systems(PostUpdate, visibility::note_visibility.after(TransformSystems::Propagate));
+            .add_systems(PostUpdate, (keep_transforms, visibility::note_visibility).after(TransformSystems::Propagate));
     }
 }
 
 /// Questions to all terrains, in world space.
 ///
 /// Terrains are where they were when transforms were last propagated, and rays hit what is drawn, not what is about to be.
+/// Where nobody propagates transforms, as with Bevy's `MinimalPlugins` alone, the plugin itself does it at the end of
+/// `PostUpdate`, for the entities of terrains only.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;

@@ -268,3 +268,21 @@ fn a_terrain_may_become_a_grid_and_cease_to_be_one() {
         assert!(drawn(&mut app, IVec3::ZERO).is_empty());
     }
 }
+
+#[test]
+fn a_terrain_that_is_no_grid_stays_where_the_space_puts_it() {
+    let mut app = space_app(false);
+    let root = app.world_mut().spawn(BigSpaceRootBundle::default()).id();
+    let place = Transform::from_xyz(100.0, 0.0, 0.0);
+    let grid = app.world_mut().spawn((Grid::new(EDGE, 100.0), CellCoord::ZERO, place, ChildOf(root))).id();
+    let cell = CellCoord::new(3, 0, 0);
+    let terrain = app.world_mut().spawn((ball(), cell, ChildOf(grid))).id();
+    let origin = app.world_mut().spawn((FloatingOrigin, cell, Transform::default(), ChildOf(grid))).id();
+    settle(&mut app, terrain);
+    // At the origin of world space, like what nobody has propagated.
+    assert_eq!(app.world().get::<GlobalTransform>(terrain), Some(&GlobalTransform::IDENTITY));
+    *app.world_mut().get_mut::<CellCoord>(origin).unwrap() = CellCoord::new(2, 0, 0);
+    (0..3).for_each(|_| app.update());
+    let moved = app.world().get::<GlobalTransform>(terrain).map(|global| global.translation());
+    assert_eq!(moved, Some(Vec3::new(EDGE, 0.0, 0.0)));
+}
