@@ -151,6 +151,50 @@ impl TerrainQuery<'_, '_> {
         let local = lattice.into() * f64::from(volume.settings()?.voxel_size);
         Some(place.to_world().transform_point3(local).as_vec3())
     }
+
+    /// A length in world units in voxels of the terrain, as brushes want it.
+    ///
+    /// Where the terrain's transform scales its axes differently, the scale is the cube root of the determinant: the factor
+    /// by which volumes grow. `None` where there is no such terrain, where it is scaled to nothing, or where a number is not finite.
+    ///
+    /// ```
+    /// use bevy_marchless::prelude::*;
+    /// # use bevy_math::Vec3;
+    ///
+    /// /// Digs a ball of 2 world units, however large voxels are.
+    /// fn dig(at: Vec3, hit: &TerrainHit, terrains: &TerrainQuery) -> Option<Stamp> {
+    ///     let middle = terrains.to_lattice(hit.terrain, at)?;
+    ///     let radius = terrains.to_lattice_length(hit.terrain, 2.0)?;
+    ///     Some(Stamp::dig(hit.terrain, BrushShape::sphere(middle, radius)))
+    /// }
+    /// ```
+    pub fn to_lattice_length(&self, terrain: Entity, world_length: f32) -> Option<f32> {
+        let length = (f64::from(world_length) / self.voxel_length(terrain)?) as f32;
+        length.is_finite().then_some(length)
+    }
+
+    /// A length in voxels of the terrain in world units: the inverse of [`to_lattice_length`](Self::to_lattice_length).
+    ///
+    /// ```
+    /// use bevy_marchless::prelude::*;
+    ///
+    /// /// How far the surface is, in world units.
+    /// fn height(hit: &TerrainHit, at: bevy_math::Vec3, terrains: &TerrainQuery) -> Option<f32> {
+    ///     terrains.to_world_length(hit.terrain, terrains.weight_at(hit.terrain, at)?)
+    /// }
+    /// ```
+    pub fn to_world_length(&self, terrain: Entity, voxels: f32) -> Option<f32> {
+        let length = (f64::from(voxels) * self.voxel_length(terrain)?) as f32;
+        length.is_finite().then_some(length)
+    }
+
+    /// The length of a voxel in world units; finite and above 0.
+    fn voxel_length(&self, terrain: Entity) -> Option<f64> {
+        let (_, volume, place) = self.terrains.get(terrain).ok()?;
+        let scale = place.to_world().matrix3.determinant().abs().cbrt();
+        let length = scale * f64::from(volume.settings()?.voxel_size);
+        (length.is_finite() && length > 0.0).then_some(length)
+    }
 }
 
 /// Whether the samples of a chunk of the terrain's extent are not there: it is not filled yet, not loaded, or they were dropped.
