@@ -52,7 +52,8 @@ impl Plugin for StreamPlugin {
 /// Chunks that some point of lies within `radii` of the entity are loaded, as if its position were rounded to an eighth of
 /// a chunk. At most [`Terrain::MAX_CHUNKS`](crate::terrain::Terrain::MAX_CHUNKS) are: larger radii are scaled down, with a
 /// warning. A viewer without a finite position or with radii that are not above 0 is reported once, and what it has loaded
-/// stays as it is.
+/// stays as it is. A terrain that loads nothing by itself, and has been there for 120 updates without any viewer, is
+/// reported, too.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default, Debug, PartialEq, Clone)]
 #[require(Transform)]

@@ -2,46 +2,15 @@
 
 mod common;
 
-use std::sync::Mutex;
 use std::time::Duration;
 
 use bevy_app::App;
 use bevy_ecs::prelude::*;
-use bevy_log::tracing::field::{Field, Visit};
-use bevy_log::tracing::{self, Event, Level, Subscriber};
-use bevy_log::tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 use common::stream::*;
 use common::*;
-
-/// The plugin's warnings and errors.
-static LOG: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-struct Recorder;
-
-impl<S: Subscriber> Layer<S> for Recorder {
-    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
-        let ours = event.metadata().target().starts_with("bevy_marchless");
-        if ours && *event.metadata().level() <= Level::WARN {
-            let mut message = Message::default();
-            event.record(&mut message);
-            LOG.lock().unwrap().push(message.0);
-        }
-    }
-}
-
-#[derive(Default)]
-struct Message(String);
-
-impl Visit for Message {
-    fn record_debug(&mut self, field: &Field, value: &dyn core::fmt::Debug) {
-        if field.name() == "message" {
-            self.0 = format!("{value:?}");
-        }
-    }
-}
 
 /// Sets a world up, updates it 100 times while all is well and 100 times after a change, and returns what was said.
 fn said(terrain: Terrain, change: impl Fn(&mut App, Entity, Entity)) -> Vec<String> {
@@ -56,7 +25,7 @@ fn said(terrain: Terrain, change: impl Fn(&mut App, Entity, Entity)) -> Vec<Stri
     for _ in 0..100 {
         app.update();
     }
-    core::mem::take(&mut LOG.lock().unwrap())
+    log::said()
 }
 
 fn place(app: &mut App, entity: Entity, change: impl Fn(&mut Transform)) {
@@ -70,8 +39,7 @@ fn see(app: &mut App, viewer: Entity, radius: f32) {
 /// One test, since a process has one log.
 #[test]
 fn each_fault_is_reported_once() {
-    let log = bevy_log::tracing_subscriber::registry().with(Recorder);
-    tracing::subscriber::set_global_default(log).expect("no other log");
+    log::record();
     let hills = || Terrain::endless(Hills::default());
 
     assert_eq!(said(hills(), |_, _, _| ()), [""; 0], "nothing is wrong");

@@ -16,7 +16,10 @@ use crate::budget::{FrameBudget, Share};
 use crate::cover::{Range, View};
 use crate::place::{Place, in_double_precision};
 use crate::stats::TerrainStats;
-use crate::terrain::TerrainVolume;
+use crate::terrain::{Terrain, TerrainVolume};
+
+/// A terrain that loads nothing by itself may wait this many updates for the first viewer, before a warning.
+const PATIENCE: u32 = 120;
 
 /// What is known of the viewers of a terrain.
 #[derive(Component, Default)]
@@ -27,6 +30,22 @@ pub(super) struct Followed {
     at: Option<At>,
     /// The latest run in which the terrain was looked at.
     run: u64,
+    /// How many updates it has waited for the first viewer; stays at [`PATIENCE`], also once there has been one.
+    waited: u32,
+}
+
+impl Followed {
+    /// Notes whether there are viewers. True once: when a terrain that loads nothing without any has waited too long.
+    fn has_waited_too_long(&mut self, there_are_viewers: bool, settings: &Terrain) -> bool {
+        if there_are_viewers {
+            self.waited = PATIENCE;
+        }
+        if self.waited == PATIENCE || !settings.kept_region().is_empty() {
+            return false;
+        }
+        self.waited += 1;
+        self.waited == PATIENCE
+    }
 }
 
 /// Where a terrain is and what it is like: its generation, and how often its settings have changed.
@@ -102,8 +121,12 @@ pub(super) fn follow_viewers(
     let share = until.saturating_duration_since(start);
     let mut seeing = Duration::ZERO;
     for (terrain, mut volume, mut followed, place) in &mut terrains {
-        if volume.settings().is_none() {
-            continue;
+        let Some(settings) = volume.settings() else { continue };
+        if followed.has_waited_too_long(!seen.seen.is_empty(), settings) {
+            bevy_log::warn!(
+                "terrain {terrain} keeps no chunks loaded and there is no terrain viewer, so nothing of it appears; \
+                 add a `TerrainViewer` to the camera, or set `keep`"
+            );
         }
         // Where things are in this very update; in a floating space, where they were when transforms were last propagated.
         let to_world = if place.is_floating() {

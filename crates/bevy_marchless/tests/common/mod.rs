@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test uses a part of the harness")]
 #![allow(unreachable_pub, reason = "a module of each test")]
 
+pub mod log;
 pub mod stream;
 
 use std::sync::atomic::{AtomicBool, Ordering};
