@@ -68,7 +68,7 @@ impl Stamp {
         Self { stroke: Some(stroke), ..self }
     }
 
-    /// The same stamp in lattice integers.
+    /// The same stamp in lattice integers, on the surface at isovalue 0; the terrain's own counts where it is applied.
     ///
     /// # Errors
     /// [`BrushError`] about the first number out of range.

@@ -120,7 +120,8 @@ impl TerrainQuery<'_, '_> {
         !self.hidden.get(terrain).is_ok_and(|is_hidden| is_hidden.0)
     }
 
-    /// The weight at a position in world space, in voxels, negative inside, with all edits; interpolated between samples.
+    /// How far a position in world space is from the surface, in voxels, negative inside, with all edits; interpolated
+    /// between samples.
     ///
     /// `None` where there is no such terrain, or a chunk with samples around it is not filled yet. Outside of the terrain's extent is air.
     pub fn weight_at(&self, terrain: Entity, position: Vec3) -> Option<f32> {
@@ -134,7 +135,7 @@ impl TerrainQuery<'_, '_> {
         if Region::new(low, high.map(|v| v + 1)).points().any(unfilled) {
             return None;
         }
-        marchless::weight_at(volume.grid(), lattice.to_array())
+        marchless::weight_at(volume.grid(), volume.settings()?.isovalue, lattice.to_array())
     }
 
     /// A position in world space in voxels from the terrain's lowest corner, as stamps want it.

@@ -34,9 +34,10 @@ use crate::volume::Recipe;
 /// A terrain [of a fixed extent](Terrain::new) is loaded as a whole; an [endless](Terrain::endless) one where a
 /// [`TerrainViewer`](crate::stream::TerrainViewer) is near.
 ///
-/// Changing `source`, `extent`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone. However often
+/// Changing `source`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone. However often
 /// they change, what is under way is shown before the newest begins; stamps wait for it.
-/// Changing `keep` loads and unloads chunks. Another `isovalue` shows in one update, once all is meshed for it; other
+/// Changing `extent` or `keep` loads and unloads chunks: what stays in the extent stays as it is, and what was dug comes back
+/// with its chunks, also where a brush reached over the border. Another `isovalue` shows in one update, once all is meshed for it; other
 /// `normals` and another `palette` show chunk by chunk. Settings out of range are refused with an error in the log and a
 /// [`TerrainError`] component; those before them stay in effect.
 ///
@@ -67,7 +68,8 @@ pub struct Terrain {
     pub voxel_size: f32,
     /// The surface lies where the weight equals this many voxels; finite. Default 0.
     ///
-    /// Edits leave weights between −4 and 4 voxels, so isovalues beyond show none of them. Sources skip chunks more than
+    /// Brushes dig into, add to and paint the surface at this isovalue, up to ±124 voxels. They leave weights within 4 voxels
+    /// of it, so that another isovalue farther away shows nothing of what they did before. Sources skip chunks more than
     /// 4 voxels from their surface, so isovalues beyond about ±3 may show seams there.
     pub isovalue: f32,
     /// Whether meshes have normals. Default true.
@@ -214,9 +216,9 @@ impl Terrain {
 
     /// Takes the settings of another one that ask for no other samples.
     fn take_all_but_samples(&mut self, other: &Self) {
-        // What is kept goes with the extent: it has been checked with that of the other one.
-        if (self.extent, self.chunk_cells) == (other.extent, other.chunk_cells) {
-            self.keep = other.keep;
+        // Both are in chunks, and have been checked with those of the other one.
+        if self.chunk_cells == other.chunk_cells {
+            (self.extent, self.keep) = (other.extent, other.keep);
         }
         (self.isovalue, self.normals) = (other.isovalue, other.normals);
         self.palette.clone_from(&other.palette);

@@ -174,6 +174,11 @@ impl Heart {
         table.keys().for_each(|key| arriving.add(key, cover));
     }
 
+    /// The chunks that there are; `None` before the terrain's settings have been accepted.
+    pub(crate) fn extent(&self) -> Option<Region> {
+        self.recipe.as_ref().map(|recipe| recipe.extent)
+    }
+
     /// Whether all chunks that were there when the present source began have been shown with it, and some chunk if there is
     /// any to show, so that the next may begin.
     pub(crate) fn is_generation_shown(&self) -> bool {
@@ -322,13 +327,8 @@ impl Recipe {
         Grid::bounded(self.cells, self.extent).expect("the settings have been checked")
     }
 
-    /// Whether its chunks are where those of another one are.
-    pub(crate) fn has_places_of(&self, other: &Self) -> bool {
-        self.extent == other.extent && self.cells == other.cells
-    }
-
-    /// Whether its samples are those of another one.
+    /// Whether the samples of a chunk are those of another one, where both have it.
     pub(crate) fn has_samples_of(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.source, &other.source) && self.has_places_of(other) && self.spacing == other.spacing
+        Arc::ptr_eq(&self.source, &other.source) && (self.cells, self.spacing) == (other.cells, other.spacing)
     }
 }

@@ -336,7 +336,7 @@ fn a_head_hangs_free_once_its_pillar_is_cut_and_can_be_dug_out() {
     }
     let body = app.world_mut().spawn(samples).id();
 
-    for stamp in head.stamps(terrain, 0.0) {
+    for stamp in head.stamps(terrain) {
         app.world_mut().write_message(stamp);
     }
     app.update();
@@ -351,7 +351,7 @@ fn a_head_hangs_free_once_its_pillar_is_cut_and_can_be_dug_out() {
 
 #[test]
 fn pieces_that_interlock_are_dug_out_one_by_one() {
-    for isovalue in [0.0, -0.3, 1.5] {
+    for isovalue in [0.0, -2.5, -0.3, 1.5] {
         let mut app = app();
         // Two rings, each through the other, above the ground.
         let ring = move |[x, y, z]: [f64; 3], flat: bool| {
@@ -366,7 +366,7 @@ fn pieces_that_interlock_are_dug_out_one_by_one() {
         assert_eq!((pieces.len(), loose.len()), (3, 2), "{pieces:?}");
         let before = Oracle::new(&app, terrain);
         let ring = before.piece(loose[0].first().to_array(), whole);
-        for stamp in loose[0].stamps(terrain, isovalue as f32) {
+        for stamp in loose[0].stamps(terrain) {
             app.world_mut().write_message(stamp);
         }
         app.update();

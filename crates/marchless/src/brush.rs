@@ -33,7 +33,7 @@ pub use edit::{Edit, VolumeByMaterial};
 pub use shape::BrushShape;
 use shape::{UNITS, units};
 
-/// As far from the surface as an edit ever leaves a sample: 4 voxels, in steps of an `i16` weight.
+/// As far from the surface as an edit ever leaves a sample that it changes: 4 voxels, in steps of an `i16` weight.
 ///
 /// A change of 8 voxels therefore turns any sample that an edit has touched from one side to the other.
 pub const EDIT_LIMIT: i16 = 4 * UNITS as i16;
@@ -41,8 +41,9 @@ pub const EDIT_LIMIT: i16 = 4 * UNITS as i16;
 /// One application of a brush: where, what, and of which material.
 ///
 /// Without a stroke it is a whole stamp: the union with the shape, or its subtraction, at once. With a
-/// stroke, weights move by the stroke's rate while its time goes by. Changed weights are clamped to
-/// ±[`EDIT_LIMIT`]; a sample whose clamped weight stays the same stays as it is.
+/// stroke, weights move by the stroke's rate while its time goes by. What is solid, and how far from the surface a sample
+/// is, goes by the stamp's isovalue. Changed weights are clamped to within [`EDIT_LIMIT`] of it; a sample whose clamped
+/// weight stays the same stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Stamp {
     /// Where.
@@ -53,6 +54,9 @@ pub struct Stamp {
     pub material: u8,
     /// How far weights move, for a stamp that is a part of a timed stroke; painting does not use it.
     pub stroke: Option<Stroke>,
+    /// The least weight that is not solid, in 1/256 voxel: what the surface's isovalue is, rounded up. Values beyond
+    /// ±[`Stamp::MAX_ISOVALUE`] count as that.
+    pub isovalue: i16,
 }
 
 /// What a stamp does to the samples of its shape.
@@ -86,9 +90,20 @@ pub struct Stroke {
 }
 
 impl Stamp {
-    /// A whole stamp.
+    /// The highest isovalue, either way, in 1/256 voxel: some 124 voxels, so that weights have room around it.
+    pub const MAX_ISOVALUE: i16 = i16::MAX - EDIT_LIMIT;
+
+    /// A whole stamp on the surface at isovalue 0.
     pub const fn new(shape: BrushShape, operation: Operation, material: u8) -> Self {
-        Self { shape, operation, material, stroke: None }
+        Self { shape, operation, material, stroke: None, isovalue: 0 }
+    }
+
+    /// The same stamp on the surface at another isovalue, in voxels; rounded up to 1/256, which is solid where a mesh at
+    /// that isovalue is.
+    #[must_use]
+    pub fn with_isovalue(self, isovalue: f32) -> Self {
+        let steps = libm::ceilf(isovalue * UNITS as f32); // NaN counts as 0
+        Self { isovalue: (steps as i16).clamp(-Self::MAX_ISOVALUE, Self::MAX_ISOVALUE), ..self }
     }
 
     /// The same stamp as a part of a timed stroke.

@@ -42,9 +42,9 @@ const MOST_MARKED_ABSENT: u128 = 4096;
 /// Cloning shares the samples, and either copy may be edited without affecting the other. The grid remembers which
 /// chunks' meshes an edit has changed, until [`Grid::take_dirty`].
 ///
-/// A **bounded** grid has air around it, so that its chunks' meshes together are closed: every sample written is
-/// intersected with a box half a voxel inside the outermost planes, and meshes of higher isovalues with that box once
-/// more.
+/// A **bounded** grid has air around it, so that its chunks' meshes together are closed: meshes, rays and reports of edits
+/// see its samples intersected with a box half a voxel inside the outermost planes ([`Grid::as_meshed`]). The samples
+/// themselves stay as they were written, so the bounds may change at any time ([`Grid::set_bounds`]).
 ///
 /// ```
 /// use marchless::{Grid, Region, Voxel};
@@ -79,12 +79,35 @@ impl<W: Weight> Grid<W> {
     /// [`GridError::ChunkCells`]; [`GridError::Bounds`] where `chunks` is empty or its lattice points do not fit in
     /// `i32`.
     pub fn bounded(chunk_cells: u32, chunks: Region) -> Result<Self, GridError> {
-        let grid = Self::new(chunk_cells)?;
-        let limits = grid.limits();
-        if chunks.is_empty() || chunks.intersection(&limits) != chunks {
-            return Err(GridError::Bounds { bounds: chunks, limits });
+        let mut grid = Self::new(chunk_cells)?;
+        grid.set_bounds(Some(chunks))?;
+        grid.take_dirty();
+        Ok(grid)
+    }
+
+    /// Gives the grid other bounds, or none. Chunks beyond them stay in memory, but are not seen, until the bounds hold them
+    /// again. Chunks at the old and at the new border are marked dirty.
+    ///
+    /// # Errors
+    /// [`GridError::Bounds`] where `bounds` is empty or its lattice points do not fit in `i32`; nothing is changed then.
+    pub fn set_bounds(&mut self, bounds: Option<Region>) -> Result<(), GridError> {
+        let limits = Self::largest(self.cells);
+        if let Some(bounds) = bounds.filter(|bounds| bounds.is_empty() || bounds.intersection(&limits) != *bounds) {
+            return Err(GridError::Bounds { bounds, limits });
         }
-        Ok(Self { bounds: Some(chunks), ..grid })
+        let former = core::mem::replace(&mut self.bounds, bounds);
+        if former == bounds {
+            return Ok(());
+        }
+        // Of a chunk within either bounds, the mesh changes unless the chunk is inner to both.
+        let is_inner = |position: [i32; 3], bounds: Option<Region>| {
+            bounds.is_none_or(|Region { min, max }| (0..3).all(|i| min[i] < position[i] && position[i] < max[i] - 1))
+        };
+        for (position, _) in self.chunks.iter().filter(|(p, _)| !is_inner(*p, former) || !is_inner(*p, bounds)) {
+            let around = Region::new(position, position).grown(1, 2);
+            self.dirty.extend(bounds.map_or(around, |bounds| bounds.intersection(&around)).points());
+        }
+        Ok(())
     }
 
     /// Cells per axis of a chunk.
@@ -114,14 +137,26 @@ impl<W: Weight> Grid<W> {
         Region::new(min, min.map(|v| v.saturating_add(self.cells as i32)))
     }
 
-    /// The sample at `point`. Absent chunks are air; beyond the bounds lies air that is half a voxel from the
-    /// surface on the outermost planes and one voxel more with each point farther out.
+    /// The sample at `point`, as it was written. Absent chunks and all beyond the bounds are air.
     pub fn get(&self, point: [i32; 3]) -> Voxel<W> {
         let position = self.chunk_of(point);
-        match (self.chunks.get(position), self.border()) {
-            (Some(chunk), _) => chunk.voxel(self.index(point)),
-            (None, Some(border)) if !self.limits().contains(position) => border.beyond(point.map(i64::from)),
-            (None, _) => Voxel::AIR,
+        match self.seen_chunk(position) {
+            Some(chunk) => chunk.voxel(self.index(point)),
+            None => Voxel::AIR,
+        }
+    }
+
+    /// The sample at `point` as meshes and rays at an isovalue (in voxels) read it: in a bounded grid intersected with
+    /// the box of its border. That lies half a voxel from the surface on the outermost planes, and one voxel more with each
+    /// point farther out.
+    pub fn as_meshed(&self, point: [i32; 3], isovalue: f32) -> Voxel<W> {
+        match self.border() {
+            Some(border) if self.limits().contains(self.chunk_of(point)) => {
+                let Voxel { weight, material } = self.get(point);
+                Voxel { weight: border.clip(point, weight, isovalue), material }
+            }
+            Some(border) => border.beyond(point.map(i64::from), isovalue),
+            None => self.get(point),
         }
     }
 
@@ -132,8 +167,6 @@ impl<W: Weight> Grid<W> {
     pub fn set(&mut self, point: [i32; 3], voxel: Voxel<W>) -> Result<(), GridError> {
         let position = self.chunk_of(point);
         self.check(position)?;
-        let weight = self.border().map_or(voxel.weight, |border| border.clip(point, voxel.weight));
-        let voxel = Voxel { weight, ..voxel };
         if self.get(point) != voxel {
             let (cells, index) = (self.cells, self.index(point));
             let samples = self.chunk_mut(position)?.samples_mut(cells, &mut SpareSamples::new());
@@ -144,27 +177,28 @@ impl<W: Weight> Grid<W> {
         Ok(())
     }
 
-    /// Puts a whole chunk at `position`, clipped to the border, and marks it and its neighbours dirty.
+    /// Puts a whole chunk at `position`, and marks it and its neighbours dirty.
     ///
     /// # Errors
     /// [`GridError::OutOfBounds`], and [`GridError::SamplesLength`] where the chunk is of another size; nothing is
     /// changed then.
     pub fn insert(&mut self, position: [i32; 3], chunk: Chunk<W>) -> Result<(), GridError> {
+        self.check(position)?;
         self.load(position, chunk)?;
         self.mark_dirty(self.chunk_region(position));
         Ok(())
     }
 
-    /// The same for a chunk of which, with its neighbours, no mesh is out of date: nothing is marked dirty.
+    /// Puts a chunk at `position` and marks nothing dirty: for a chunk of which, with its neighbours, no mesh is out of
+    /// date. Beyond the bounds it is kept, and not seen.
     ///
     /// # Errors
-    /// As [`Grid::insert`].
-    pub fn load(&mut self, position: [i32; 3], mut chunk: Chunk<W>) -> Result<(), GridError> {
+    /// [`GridError::SamplesLength`], and [`GridError::OutOfBounds`] where there is no place for a chunk in any grid.
+    pub fn load(&mut self, position: [i32; 3], chunk: Chunk<W>) -> Result<(), GridError> {
         chunk.check(self.cells)?;
-        self.check(position)?;
-        let region = self.chunk_region(position);
-        if let Some(border) = self.border().filter(|border| border.reaches(&region)) {
-            chunk.clip(region.min, self.cells, &border);
+        let bounds = Self::largest(self.cells);
+        if !bounds.contains(position) {
+            return Err(GridError::OutOfBounds { position, bounds });
         }
         self.chunks.insert(position, chunk);
         Ok(())
@@ -196,7 +230,7 @@ impl<W: Weight> Grid<W> {
         self.insert(position, Chunk::from_source(source, position, self.cells, spacing))
     }
 
-    /// The chunk at `position`, where there is one.
+    /// The chunk at `position`, where there is one; also beyond the bounds.
     pub fn chunk(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
         self.chunks.get(position)
     }
@@ -260,7 +294,8 @@ impl<W: Weight> Grid<W> {
                 let column = self.chunks.from([x, y, around[2][0]]);
                 for (neighbour, chunk) in column.take_while(|(neighbour, _)| *neighbour <= [x, y, around[2][2]]) {
                     let k = (neighbour[2] - around[2][0]) as usize;
-                    chunks[i + 3 * (j + 3 * k)] = Some(chunk);
+                    let index = i + 3 * (j + 3 * k);
+                    chunks[index] = (beyond >> index & 1 == 0).then_some(chunk);
                 }
             }
         }
@@ -325,11 +360,21 @@ impl<W: Weight> Grid<W> {
         self.neighbourhood_view(position).mesh(mesher, &mut Block::new(), settings, out)
     }
 
-    /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who clips it to the
-    /// border and marks what has changed.
+    /// The chunk at `position`, where there is one within the bounds.
+    pub(crate) fn seen_chunk(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
+        let is_seen = self.bounds.is_none_or(|bounds| bounds.contains(position));
+        self.chunks.get(position).filter(|_| is_seen)
+    }
+
+    /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who marks what has changed.
     pub(crate) fn chunk_mut(&mut self, position: [i32; 3]) -> Result<&mut Chunk<W>, GridError> {
         self.check(position)?;
         Ok(self.chunks.get_mut_or_air(position))
+    }
+
+    /// The chunk at `position`, where there is one, also beyond the bounds, to be changed in the same way.
+    pub(crate) fn present_chunk_mut(&mut self, position: [i32; 3]) -> Option<&mut Chunk<W>> {
+        self.chunks.get_mut(position)
     }
 
     /// Which chunk positions hold a chunk.
@@ -337,7 +382,7 @@ impl<W: Weight> Grid<W> {
         self.chunks.occupancy()
     }
 
-    /// The border of a bounded grid, that all samples written are clipped to.
+    /// The border of a bounded grid.
     pub(crate) fn border(&self) -> Option<Border> {
         self.planes().map(Border::new)
     }

@@ -91,13 +91,15 @@ fn is_shown_without_chunks<W: Weight>(grid: &Grid<W>, isovalue: f32) -> bool {
     grid.bounds().is_some() && W::OUTSIDE.inside(W::threshold(isovalue))
 }
 
-/// The weight at any position, in voxels: trilinear between the eight lattice points around it; finite, infinite and
-/// NaN samples count as the farthest finite ones of their side. `None` where the position is not finite.
+/// How far from the surface at `isovalue` a position is, in voxels, negative inside: the weight there less the isovalue.
+/// `None` where the position or the isovalue is not finite.
 ///
-/// `position`: in lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of
-/// triangles, which the trilinear surface only comes close to.
-pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
-    if !position.iter().all(|v| v.is_finite()) {
+/// The weight is trilinear between the eight lattice points around the position, as meshes read them
+/// ([`Grid::as_meshed`]); infinite and NaN samples count as the farthest finite ones of their side. `position`: in lattice
+/// units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles, which the trilinear
+/// surface only comes close to.
+pub fn weight_at<W: Weight>(grid: &Grid<W>, isovalue: f32, position: [f64; 3]) -> Option<f32> {
+    if !position.iter().all(|v| v.is_finite()) || !isovalue.is_finite() {
         return None;
     }
     let limits = (f64::from(i32::MIN), f64::from(i32::MAX - 1));
@@ -110,9 +112,9 @@ pub fn weight_at<W: Weight>(grid: &Grid<W>, position: [f64; 3]) -> Option<f32> {
             if offset[axis] == 1 { high } else { 1.0 - high }
         });
         let point = [0, 1, 2].map(|axis| low[axis] as i32 + i32::from(offset[axis]));
-        share[0] * share[1] * share[2] * grid.get(point).weight.finite() / f64::from(W::SCALE)
+        share[0] * share[1] * share[2] * grid.as_meshed(point, isovalue).weight.finite() / f64::from(W::SCALE)
     });
-    Some(weight.sum::<f64>() as f32)
+    Some((weight.sum::<f64>() - f64::from(isovalue)) as f32)
 }
 
 /// The triangles of one chunk.
@@ -125,7 +127,7 @@ struct Surface<'a, W: Weight> {
     /// Cells per axis.
     cells: i32,
     isovalue: f32,
-    /// The border of a bounded grid, where the isovalue raises it and the chunk's cells reach it.
+    /// The border of a bounded grid, where the chunk's cells reach it.
     border: Option<Border>,
 }
 
@@ -141,22 +143,21 @@ impl<'a, W: Weight> Surface<'a, W> {
         let chunks = Corner::ALL.map(|corner| {
             let offset = corner.offset();
             let position = [0, 1, 2].map(|axis| position[axis].saturating_add(offset[axis].into()));
-            match grid.chunk(position) {
+            match grid.seen_chunk(position) {
                 Some(Chunk::Uniform(voxel)) => Part::Uniform(*voxel),
                 Some(Chunk::Samples(samples)) => Part::Samples(samples),
                 // Beyond the bounds, all that a chunk's cells read lies on the outermost planes and is the same.
-                None => Part::Uniform(grid.get(grid.chunk_region(position).min)),
+                None => Part::Uniform(grid.as_meshed(grid.chunk_region(position).min, isovalue)),
             }
         });
         let region = grid.chunk_region(position);
-        let border = grid.border().and_then(|border| border.raised(isovalue));
         Self {
             position,
             origin: region.min,
             chunks,
             cells: grid.chunk_cells() as i32,
             isovalue,
-            border: border.filter(|border| border.reaches(&region.grown(0, 1))),
+            border: grid.border().filter(|border| border.reaches(&region.grown(0, 1))),
         }
     }
 
@@ -168,7 +169,9 @@ impl<'a, W: Weight> Surface<'a, W> {
             Part::Samples(_) => None,
         };
         let first = inside(&self.chunks[0]);
-        self.border.is_none() && first.is_some() && self.chunks.iter().all(|chunk| inside(chunk) == first)
+        // A border makes air of what is inside, and leaves what is outside there.
+        first.is_some_and(|first| self.border.is_none() || !first)
+            && self.chunks.iter().all(|chunk| inside(chunk) == first)
     }
 
     /// The nearest hit in `cell`.
@@ -239,7 +242,7 @@ impl<'a, W: Weight> Surface<'a, W> {
             Some(border) => {
                 let offset = corner.offset();
                 let point = [0, 1, 2].map(|axis| self.origin[axis] + local[axis] + i32::from(offset[axis]));
-                Voxel { weight: border.clip(point, voxel.weight), ..voxel }
+                Voxel { weight: border.clip(point, voxel.weight, self.isovalue), ..voxel }
             }
             None => voxel,
         }

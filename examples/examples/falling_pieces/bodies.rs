@@ -49,7 +49,7 @@ fn free_pieces(
         let Ok(terrain) = terrains.get(edited.terrain) else { continue };
         let Ok(pieces) = bits.loose_pieces(edited, MARGIN) else { continue };
         for piece in &pieces {
-            stamps.write_batch(piece.stamps(edited.terrain, terrain.isovalue));
+            stamps.write_batch(piece.stamps(edited.terrain));
             let Ok(samples) = bits.samples(edited.terrain, piece) else { continue };
             if piece.size() < DUST {
                 continue;

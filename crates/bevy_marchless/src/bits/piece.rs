@@ -81,7 +81,7 @@ impl Piece {
             own.get(place)
         };
         let voxel = |point| {
-            let voxel = grid.get(point);
+            let voxel = grid.as_meshed(point, isovalue);
             let weight = voxel.weight.to_voxels();
             if weight >= isovalue || is_own(point) {
                 return voxel;
@@ -101,15 +101,14 @@ impl Piece {
     /// Stamps that dig it out of `terrain`, and nothing else: all its points become air, and no other point changes sides.
     /// Surfaces less than half a voxel away may move a little.
     ///
-    /// `isovalue`: the terrain's; from −0.4 to 3, in voxels. (At lower ones, solid points next to the piece's corners may go
-    /// with it.) What the terrain has become since the piece was found, the stamps do not know: write them in
+    /// What the terrain has become since the piece was found, the stamps do not know: write them in
     /// the same update, or ask again before.
-    pub fn stamps(&self, terrain: Entity, isovalue: f32) -> Vec<Stamp> {
+    pub fn stamps(&self, terrain: Entity) -> Vec<Stamp> {
         let (own, mut others) = (self.bits(), self.around());
         others.subtract(&own).expect("both have the size of its bounds");
         // How far beyond its outermost points a box ends: at these, samples become half a voxel of air, and at those
         // next to them at least half a voxel of ground stays.
-        let rim = if isovalue.is_finite() { (0.5 + isovalue).clamp(0.1, 3.5) } else { 0.5 };
+        let rim = 0.5;
         let origin = IVec3::from(self.bounds.min).as_dvec3();
         let mut stamps = Vec::new();
         let mut regions = vec![Region::new([0; 3], self.bounds.size().map(|v| v as i32))];

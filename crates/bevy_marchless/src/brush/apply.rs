@@ -67,10 +67,10 @@ pub(super) fn apply_stamps(
             }
             return waits;
         };
-        if volume.settings().is_none() {
+        let Some(isovalue) = volume.settings().map(|settings| settings.isovalue) else {
             bevy_log::warn!("a stamp is dropped: the settings of terrain {terrain} were refused");
             return false;
-        }
+        };
         let waits = waiting.entry(terrain).or_default();
         let request = *queued.request.get_or_insert(volume.requests());
         if request != volume.requests() {
@@ -78,7 +78,8 @@ pub(super) fn apply_stamps(
         }
         *waits = *waits || volume.has_next() || !volume.heart_mut().has_samples_for(queued.stamp.region());
         if !*waits {
-            volume.heart_mut().stamp(queued.stamp, queued.since, edits.entry(terrain).or_default());
+            let stamp = queued.stamp.with_isovalue(isovalue);
+            volume.heart_mut().stamp(stamp, queued.since, edits.entry(terrain).or_default());
         }
         *waits
     });

@@ -47,7 +47,7 @@ pub(crate) fn prepare_terrains(
             && let Some((terrain, before)) = volume.take_next()
         {
             match before {
-                Some(before) if before.recipe().has_places_of(&terrain.recipe()) => {
+                Some(before) if before.chunk_cells == terrain.chunk_cells => {
                     if before.voxel_size != terrain.voxel_size {
                         place_chunks(&terrain, volume.heart(), &mut transforms);
                     }
@@ -65,7 +65,11 @@ pub(crate) fn prepare_terrains(
 fn follow_settings(volume: &mut TerrainVolume) {
     let Some(settings) = volume.settings() else { return };
     let (isovalue, normals, colors) = (settings.isovalue, settings.normals, settings.palette.to_vertex_colors());
+    let extent = settings.chunk_region();
     let heart = volume.heart_mut();
+    if heart.extent() != Some(extent) {
+        heart.resize(extent);
+    }
     if heart.mesh_settings().normals != normals || **heart.colors() != colors {
         heart.set_look(normals, Arc::new(colors));
     }

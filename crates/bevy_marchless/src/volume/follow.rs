@@ -4,6 +4,7 @@ use bevy_platform::time::Instant;
 use marchless::{Chunk, Region};
 
 use super::Heart;
+use super::groups::Pending;
 use super::table::Unloaded;
 use crate::budget::ENTITY_TIME;
 use crate::chunk::ChunkKey;
@@ -96,6 +97,46 @@ impl Heart {
         !few.is_empty()
     }
 
+    /// Gives the terrain another extent. Chunks that it has before and after stay, with all that was dug; those beyond go, but
+    /// for their edits. Walls come and go chunk by chunk, as soon as what is around them is there.
+    pub(crate) fn resize(&mut self, extent: Region) {
+        let Some(recipe) = &mut self.recipe else { return };
+        let former = core::mem::replace(&mut recipe.extent, extent);
+        self.samples.resize(extent);
+        self.table.resize(extent);
+        let is_inner = |key: &ChunkKey, region: Region| {
+            (0..3).all(|axis| (region.min[axis] + 1..region.max[axis] - 1).contains(&key.position[axis]))
+        };
+        let keys: Vec<ChunkKey> =
+            self.table.keys().filter(|key| !is_inner(key, former) || !is_inner(key, extent)).collect();
+        for key in keys {
+            if extent.contains(key.position) {
+                self.at_other_border(key);
+            } else {
+                self.leaving.push(key);
+            }
+        }
+    }
+
+    /// Another part of a chunk lies at the terrain's border, or none.
+    fn at_other_border(&mut self, key: ChunkKey) {
+        self.table.samples_changed(key);
+        if self.groups.is_claimed(key) {
+            // It is being meshed as it was.
+            self.changed(Pending { chunks: [key].into(), ..Pending::default() });
+        } else {
+            self.table.set_stale(key);
+            self.renew_in_transition(key);
+        }
+        if self.table.lacks_samples(key) {
+            self.look_at(key);
+        } else {
+            // It may have waited for samples that are not wanted any more.
+            self.groups.wake();
+            self.unblock_transition(key);
+        }
+    }
+
     /// The game has despawned a chunk's entity. Its samples stay: its neighbours' meshes need them.
     pub(crate) fn despawned(&mut self, key: ChunkKey, entity: bevy_ecs::entity::Entity) {
         self.table.despawned(key, entity);
@@ -117,7 +158,8 @@ impl Heart {
     /// Makes of a chunk what the cover asks of it.
     fn settle(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         let Some(extent) = self.recipe.as_ref().map(|recipe| recipe.extent) else { return };
-        let wanted = self.cover.wanted(key.position, self.table.kept(key));
+        let is_there = extent.contains(key.position);
+        let wanted = if is_there { self.cover.wanted(key.position, self.table.kept(key)) } else { Wanted::Gone };
         match (self.table.contains(key), wanted) {
             (false, Wanted::Gone) => return,
             (false, _) => self.load(key, wanted, stats),

@@ -127,6 +127,14 @@ impl Samples {
         self.newest.neighbourhood_view(position)
     }
 
+    /// Has other chunks be seen. Samples of the others stay until they are unloaded, or for good where they are held.
+    pub(super) fn resize(&mut self, extent: Region) {
+        for grid in [&mut self.newest, &mut self.shown] {
+            grid.set_bounds(Some(extent)).expect("the settings have been checked");
+            grid.take_dirty();
+        }
+    }
+
     /// Begins anew: all samples come from another source, and what was edited is gone. What is shown stays.
     pub(super) fn refill(&mut self, empty: Grid<i16>) {
         self.newest = empty;
@@ -193,18 +201,20 @@ impl Samples {
         }
     }
 
-    /// Applies a stamp to all resident chunks, and keeps it for the others. `before`: gets the chunks that it changes, as
-    /// they were, unless they stand there already.
+    /// Applies a stamp to all resident chunks, and keeps it for the others, also beyond the extent, which may grow; but not
+    /// a stamp that lies wholly beyond. `before`: gets the chunks that it changes, as they were, unless they stand there
+    /// already.
     pub(super) fn stamp(&mut self, stamp: Stamp, before: &mut BTreeMap<[i32; 3], Chunk<i16>>) -> Changed {
         let mut changed =
             Changed { edit: Edit::NONE, chunks: Vec::new(), affected: BTreeSet::new(), crowded: Vec::new() };
         let touched = stamp.region();
         let Some(bounds) = self.newest.bounds().filter(|_| !touched.is_empty()) else { return changed };
         let ends = [touched.min, touched.max.map(|v| v - 1)].map(|end| self.newest.chunk_of(end));
-        let region = Region::new(ends[0], ends[1].map(|v| v + 1)).intersection(&bounds);
-        if region.is_empty() {
+        let region = Region::new(ends[0], ends[1].map(|v| v + 1));
+        if region.intersection(&bounds).is_empty() {
             return changed;
         }
+        let region = region.intersection(&Grid::<i16>::largest(self.newest.chunk_cells()));
         let (number, stamp) = (self.log.next(), Arc::new(stamp));
         for position in self.resident_in(region) {
             // A clone is made for the first change only: while it lives, the samples are copied to be changed.
@@ -238,11 +248,11 @@ impl Samples {
         self.newest.chunks_in(region).map(|(position, _)| position).collect()
     }
 
-    /// Applies a stamp to a resident chunk.
+    /// Applies a stamp to a resident chunk. What changes beyond the extent is not reported.
     fn change(&mut self, position: [i32; 3], number: u64, stamp: &Stamp) -> Edit {
         let edit = self.newest.apply_to_chunk(position, stamp, &mut self.spare);
         self.note_changes(position, u32::from(!edit.is_empty()), number, false);
-        edit
+        if is_seen(&self.newest, position) { edit } else { Edit::NONE }
     }
 
     /// Notes that stamps up to a number have changed a chunk this many times; `afresh`: in all.
@@ -273,7 +283,7 @@ impl Replay {
         for Logged { number, stamp, .. } in &self.stamps {
             let edit = self.grid.apply_to_chunk(self.position, stamp, &mut SpareSamples::new());
             replayed.changes += u32::from(!edit.is_empty());
-            if *number > self.reported {
+            if *number > self.reported && is_seen(&self.grid, self.position) {
                 replayed.edit.merge(&edit);
             }
         }
@@ -285,6 +295,11 @@ impl Replayed {
     const fn nothing() -> Self {
         Self { through: 0, changes: 0, edit: Edit::NONE }
     }
+}
+
+/// Whether a chunk lies within the bounds.
+fn is_seen(grid: &Grid<i16>, position: [i32; 3]) -> bool {
+    grid.bounds().is_none_or(|bounds| bounds.contains(position))
 }
 
 /// The box of one chunk.

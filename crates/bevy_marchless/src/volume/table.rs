@@ -275,6 +275,11 @@ impl ChunkTable {
         }
     }
 
+    /// There are other chunks. Those beyond are to be unloaded.
+    pub(super) fn resize(&mut self, extent: Region) {
+        self.extent = extent;
+    }
+
     /// All samples are to be had anew. What is shown stays until then.
     pub(super) fn refill(&mut self) {
         self.ready = UniqueQueue::default();

@@ -16,7 +16,15 @@ use crate::jobs::{Priority, WorkQueue, do_next};
 use crate::stats::TerrainStats;
 
 const CELLS: u32 = 8;
-const EXTENT: Region = Region { min: [-4, -3, -4], max: [5, 3, 4] };
+/// Of every extent.
+const WHOLE: Region = Region { min: [-4, -3, -4], max: [5, 3, 4] };
+/// The extents that a terrain may be given.
+const EXTENTS: [Region; 4] = [
+    WHOLE,
+    Region { min: [-3, -3, -4], max: [5, 3, 4] },
+    Region { min: [-3, -2, -3], max: [3, 2, 3] },
+    Region { min: [-1, -1, 0], max: [0, 1, 4] },
+];
 
 /// What happens to a terrain. Lengths in chunks.
 #[derive(Clone, Debug)]
@@ -28,6 +36,7 @@ enum Event {
     Colors,
     Normals,
     Isovalue { isovalue: f32 },
+    Extent { index: usize },
     Update { jobs: usize, inline: usize, late: bool },
 }
 
@@ -43,6 +52,7 @@ fn event() -> impl Strategy<Value = Event> {
         1 => Just(Event::Colors),
         1 => Just(Event::Normals),
         1 => (-1.5f32..1.5).prop_map(|isovalue| Event::Isovalue { isovalue }),
+        2 => (0usize..4).prop_map(|index| Event::Extent { index }),
         12 => (0usize..30, prop_oneof![Just(0usize), Just(8)], any::<bool>())
             .prop_map(|(jobs, inline, late)| Event::Update { jobs, inline, late }),
     ]
@@ -56,6 +66,7 @@ struct Game {
     /// What is on the screen.
     screen: HashMap<Entity, (ChunkKey, Arc<MeshBuffer>)>,
     despawned: Vec<ChunkKey>,
+    views: HashMap<u32, ([f64; 3], f64, f64, Option<f64>)>,
     next_entity: u32,
     /// The stamps since the source began, and those that wait.
     stamps: Vec<Stamp>,
@@ -65,9 +76,9 @@ struct Game {
     isovalue: f32,
 }
 
-fn recipe(shift: f64) -> Recipe {
+fn recipe(shift: f64, extent: Region) -> Recipe {
     let hills = move |[x, y, z]: [f64; 3]| y - shift - 3.0 * (x * 0.2).sin() * (z * 0.15).cos();
-    Recipe { source: Arc::new(hills), extent: EXTENT, cells: CELLS, spacing: 1.0 }
+    Recipe { source: Arc::new(hills), extent, cells: CELLS, spacing: 1.0 }
 }
 
 fn colors() -> Colors {
@@ -76,13 +87,14 @@ fn colors() -> Colors {
 
 impl Game {
     fn new() -> Self {
-        let recipe = recipe(0.0);
+        let recipe = recipe(0.0, WHOLE);
         Self {
             heart: Heart::new(recipe.clone(), 0.0, true, colors(), true),
             queue: WorkQueue::default(),
             stats: TerrainStats::default(),
             screen: HashMap::new(),
             despawned: Vec::new(),
+            views: HashMap::new(),
             next_entity: 1,
             stamps: Vec::new(),
             waiting: Vec::new(),
@@ -95,18 +107,17 @@ impl Game {
     fn happen(&mut self, event: &Event) {
         match *event {
             Event::View { viewer, view } => {
-                let view = view.map(|(middle, radius, margin, samples)| {
-                    let range = Range::ellipsoid(middle, [radius; 3], EXTENT);
-                    let samples = samples.map(|samples| Range::ellipsoid(middle, [samples + 0.1; 3], EXTENT));
-                    View::new(range, margin, samples, [1.0, 0.0, 0.0])
-                });
-                self.heart.set_view(Entity::from_raw_u32(viewer), view);
+                match view {
+                    Some(view) => _ = self.views.insert(viewer, view),
+                    None => _ = self.views.remove(&viewer),
+                }
+                self.look(viewer);
             }
             Event::Stamp { center, radius, add } => {
                 let scale = f64::from(CELLS);
                 let shape = BrushShape::sphere(center.map(|v| v * scale), radius * scale).expect("in range");
                 let operation = if add { Operation::Add } else { Operation::Dig };
-                self.waiting.push(Stamp::new(shape, operation, 3));
+                self.waiting.push(Stamp::new(shape, operation, 3).with_isovalue(self.isovalue));
             }
             Event::Despawn { index } => {
                 let mut all: Vec<_> = self.screen.iter().map(|(entity, (key, _))| (*key, *entity)).collect();
@@ -119,7 +130,7 @@ impl Game {
             }
             Event::Source { shift } => {
                 if self.heart.is_generation_shown() {
-                    self.recipe = recipe(shift);
+                    self.recipe = recipe(shift, self.recipe.extent);
                     self.heart.refill(self.recipe.clone(), self.isovalue);
                     self.stamps.clear();
                     self.waiting.clear();
@@ -134,8 +145,26 @@ impl Game {
                 self.isovalue = isovalue;
                 self.heart.set_isovalue(isovalue);
             }
+            Event::Extent { index } => {
+                self.recipe.extent = EXTENTS[index];
+                self.heart.resize(EXTENTS[index]);
+                let mut viewers: Vec<u32> = self.views.keys().copied().collect();
+                viewers.sort_unstable();
+                viewers.into_iter().for_each(|viewer| self.look(viewer));
+            }
             Event::Update { jobs, inline, late } => self.update(jobs, inline, late),
         }
+    }
+
+    /// Tells the heart what a viewer sees.
+    fn look(&mut self, viewer: u32) {
+        let extent = self.recipe.extent;
+        let view = self.views.get(&viewer).map(|&(middle, radius, margin, samples)| {
+            let range = Range::ellipsoid(middle, [radius; 3], extent);
+            let samples = samples.map(|samples| Range::ellipsoid(middle, [samples + 0.1; 3], extent));
+            View::new(range, margin, samples, [1.0, 0.0, 0.0])
+        });
+        self.heart.set_view(Entity::from_raw_u32(viewer), view);
     }
 
     /// What the systems do in an update. `late`: there is no time.
@@ -165,7 +194,11 @@ impl Game {
                 break;
             }
             self.waiting.remove(0);
-            self.stamps.push(stamp);
+            // What lies wholly beyond the extent is not kept.
+            let [low, high] = [stamp.region().min, stamp.region().max.map(|v| v - 1)];
+            let [low, high] = [low, high].map(|end| end.map(|v| v.div_euclid(CELLS as i32)));
+            let touched = Region::new(low, high.map(|v| v + 1)).intersection(&self.recipe.extent);
+            self.stamps.extend((!touched.is_empty()).then_some(stamp));
             self.heart.stamp(stamp, self.stats.now(), &mut edits);
         }
         self.heart.set_holds_stamps(!self.waiting.is_empty());
@@ -279,14 +312,14 @@ impl Game {
             assert_eq!(*on_screen, key);
             assert!(Arc::ptr_eq(geometry, &heart.table.drawn(key).expect("it is drawn").geometry));
         }
-        for position in EXTENT.points() {
+        for position in WHOLE.points() {
             let key = ChunkKey::finest(position);
             let (filled, resident) = (heart.table.is_filled(key), heart.samples.is_resident(position));
             let may_be_resident = filled || heart.samples.is_held(position);
             assert!(resident == filled || resident && may_be_resident, "{position:?}: {filled}, {resident}");
         }
         for queue in [heart.arriving.len(), heart.to_fill.len(), heart.to_mesh.len()] {
-            assert!(queue <= 2 * EXTENT.points().count());
+            assert!(queue <= 2 * WHOLE.points().count());
         }
     }
 
@@ -306,8 +339,10 @@ impl Game {
         assert_eq!(heart.coverage().waiting, 0);
         assert_eq!(heart.isovalue(), self.isovalue);
         assert!(heart.is_generation_shown() && heart.sampling == 0 && heart.groups.is_empty());
-        let mut fresh = Grid::<i16>::bounded(CELLS, EXTENT).expect("a good extent");
-        for position in EXTENT.points() {
+        let extent = self.recipe.extent;
+        assert!(heart.table.keys().all(|key| extent.contains(key.position)), "what lies beyond has gone");
+        let mut fresh = Grid::<i16>::bounded(CELLS, extent).expect("a good extent");
+        for position in extent.points() {
             let source = self.recipe.source.as_ref();
             fresh.load(position, Chunk::from_source(source, position, CELLS, 1.0)).expect("a chunk of it");
             for stamp in &self.stamps {
@@ -315,7 +350,7 @@ impl Game {
             }
         }
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
-        for position in EXTENT.points() {
+        for position in extent.points() {
             let key = ChunkKey::finest(position);
             if let Some(chunk) = heart.samples().newest().chunk(position) {
                 let expected = fresh.chunk(position).expect("all are there");

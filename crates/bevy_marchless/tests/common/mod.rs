@@ -126,13 +126,23 @@ pub fn assert_drawn(app: &mut App, terrain: Entity) {
     }
 }
 
-/// Asserts that what is drawn is what a new terrain of the same settings would show after these stamps. The terrain is bounded.
+/// The same where all stamps came at the isovalue that the terrain has now.
 pub fn assert_as_new(app: &mut App, terrain: Entity, stamps: &[Stamp]) {
     let settings = app.world().get::<Terrain>(terrain).expect("a terrain").clone();
+    let stamps: Vec<_> = stamps.iter().map(|stamp| core_stamp(stamp, settings.isovalue)).collect();
+    assert_as_new_after(app, terrain, &stamps);
+}
+
+/// A stamp as it is applied to a terrain at an isovalue.
+pub fn core_stamp(stamp: &Stamp, isovalue: f32) -> marchless::Stamp {
+    stamp.quantised().expect("numbers in range").with_isovalue(isovalue)
+}
+
+/// Asserts that what is drawn is what a new terrain of the same settings would show after these stamps. The terrain is bounded.
+pub fn assert_as_new_after(app: &mut App, terrain: Entity, stamps: &[marchless::Stamp]) {
+    let settings = app.world().get::<Terrain>(terrain).expect("a terrain").clone();
     let mut fresh = stream::Fresh::new(&settings);
-    for stamp in stamps {
-        fresh.stamp(&stamp.quantised().expect("numbers in range"));
-    }
+    stamps.iter().for_each(|stamp| fresh.stamp(stamp));
     let mut drawn: std::collections::BTreeMap<_, _> =
         geometry(app, terrain).into_iter().map(|(position, mesh)| (position.to_array(), mesh)).collect();
     for position in fresh.extent().points() {

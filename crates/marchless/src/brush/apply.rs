@@ -1,15 +1,16 @@
 //! Applying stamps to chunks and grids.
 
-use super::{EDIT_LIMIT, Edit, Stamp, change::Change};
+use super::{Edit, Stamp, change::Change};
 use crate::{
-    grid::{Chunk, Grid, GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples, border::Border},
+    grid::{Chunk, Grid, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples, border::Border},
     lattice::Region,
     sample::Voxel,
 };
 
 impl Grid<i16> {
     /// Applies `stamp` to all the chunks it touches, absent ones (air) included, and marks dirty what has changed. In a
-    /// bounded grid nothing changes outside the bounds, and the border stays air.
+    /// bounded grid nothing changes outside the bounds, and samples on the outermost planes, which no surface has inside, do
+    /// not count as volume.
     pub fn apply(&mut self, stamp: &Stamp) -> Edit {
         let mut edit = Edit::NONE;
         let touched = stamp.region();
@@ -26,28 +27,25 @@ impl Grid<i16> {
     }
 
     /// Applies `stamp` to the samples of one chunk only, and marks dirty what has changed. Nothing changes where there
-    /// is no place for a chunk.
+    /// is no place for a chunk, nor beyond the bounds where there is no chunk; one that is there changes unseen, and its
+    /// edit has no volume.
     ///
     /// Applied to every chunk, each in its own time but with the stamps in the same order, it gives the same samples as
     /// [`Grid::apply`]. `spare`: memory for a copy of the samples, which is made where clones of the chunk are there.
     pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &Stamp, spare: &mut SpareSamples) -> Edit {
-        let edit = self.change_chunk(position, stamp, spare).unwrap_or_default();
-        self.mark_dirty(edit.region);
-        edit
-    }
-
-    fn change_chunk(&mut self, position: [i32; 3], stamp: &Stamp, spare: &mut SpareSamples) -> Result<Edit, GridError> {
         let (cells, planes, origin) = (self.chunk_cells(), self.planes(), self.chunk_region(position).min);
-        self.check(position)?;
-        if self.chunk(position).is_some() {
-            return Ok(self.chunk_mut(position)?.change(origin, cells, planes, stamp, spare));
+        if let Some(chunk) = self.present_chunk_mut(position) {
+            let edit = chunk.change(origin, cells, planes, stamp, spare);
+            self.mark_dirty(edit.region);
+            return edit;
         }
         let mut chunk = Chunk::AIR;
         let edit = chunk.change(origin, cells, planes, stamp, spare);
-        if !edit.is_empty() {
-            *self.chunk_mut(position)? = chunk;
+        if edit.is_empty() || self.check(position).and_then(|()| self.load(position, chunk)).is_err() {
+            return Edit::NONE;
         }
-        Ok(edit)
+        self.mark_dirty(edit.region);
+        edit
     }
 }
 
@@ -56,8 +54,8 @@ impl Chunk<i16> {
     /// samples are written out or copied only where some of them change.
     ///
     /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes
-    /// of a bounded grid ([`Grid::planes`]): its border stays closed, and nothing changes beyond. Nothing changes
-    /// either in a chunk whose samples are not `cells³`, or where no chunk has so many.
+    /// of a bounded grid ([`Grid::planes`]), on and beyond which samples do not count as volume. Nothing changes in a chunk
+    /// whose samples are not `cells³`, or where no chunk has so many.
     pub fn apply_stamp(&mut self, origin: [i32; 3], cells: u32, planes: Option<Region>, stamp: &Stamp) -> Edit {
         self.change(origin, cells, planes, stamp, &mut SpareSamples::new())
     }
@@ -71,12 +69,13 @@ impl Chunk<i16> {
         spare: &mut SpareSamples,
     ) -> Edit {
         let chunk = Region::new(origin, origin.map(|v| v.saturating_add_unsigned(cells)));
-        let area = planes.map_or(chunk, |planes| chunk.intersection(&planes)).intersection(&stamp.region());
+        let area = chunk.intersection(&stamp.region());
         let cells_fit = (MIN_CHUNK_CELLS..=MAX_CHUNK_CELLS).contains(&cells) && self.check(cells).is_ok();
         if area.is_empty() || !cells_fit {
             return Edit::NONE;
         }
-        let pass = Pass::new(stamp, origin, cells, planes, area);
+        let border = planes.map(Border::new).filter(|border| border.reaches(&area));
+        let pass = Pass { change: Change::new(stamp), origin, cells, area, border };
         if let Self::Uniform(old) = *self
             && let Some(new) = pass.change_of_all(old)
             && (new == old || area == chunk)
@@ -85,7 +84,7 @@ impl Chunk<i16> {
             let mut edit = Edit::NONE;
             if new != old {
                 edit.region = area;
-                count(&mut edit, old, new, area.size().into_iter().map(u64::from).product());
+                pass.count(&mut edit, old, new, pass.seen_points());
             }
             return edit;
         }
@@ -102,23 +101,26 @@ struct Pass {
     cells: u32,
     /// Those of its points that the stamp may change; not empty.
     area: Region,
-    /// The border of a bounded grid, where it keeps some weights of the area up.
+    /// The border of a bounded grid, where the area may reach it.
     border: Option<Border>,
 }
 
 impl Pass {
-    fn new(stamp: &Stamp, origin: [i32; 3], cells: u32, planes: Option<Region>, area: Region) -> Self {
-        let border = planes.map(Border::new).filter(|border| border.reaches(&area));
-        Self { change: Change::new(stamp), origin, cells, area, border }
-    }
-
     /// What becomes of the area's samples where all are `old`, if a glance shows that it is the same for all.
     fn change_of_all(&self, old: Voxel<i16>) -> Option<Voxel<i16>> {
-        if self.change.leaves(old, -EDIT_LIMIT) {
+        if self.change.leaves(old) {
             return Some(old);
         }
-        let distance = self.change.distance_over(&self.area)?;
-        self.border.is_none().then(|| self.change.at_distance(old, distance, -EDIT_LIMIT))
+        self.change.distance_over(&self.area).map(|distance| self.change.at_distance(old, distance))
+    }
+
+    /// How many points of the area can be inside of a surface.
+    fn seen_points(&self) -> u64 {
+        let is_seen = |point: &[i32; 3]| self.border.is_none_or(|border| !border.excludes(*point));
+        match self.border {
+            None => self.area.size().into_iter().map(u64::from).product(),
+            Some(_) => self.area.points().filter(is_seen).count() as u64,
+        }
     }
 
     /// Applies the change sample by sample.
@@ -130,7 +132,7 @@ impl Pass {
             let ([y, z], start) = self.row(row);
             xs.clone().zip(start..).any(|(x, index)| {
                 let old = chunk.voxel(index);
-                self.at(old, [x, y, z]) != old
+                self.change.at_point(old, [x, y, z]) != old
             })
         });
         let Some(first_changed) = first_changed else { return edit };
@@ -140,12 +142,13 @@ impl Pass {
             let mut changed = None;
             for (x, index) in xs.clone().zip(start..) {
                 let old = Voxel::new(samples.weights[index], samples.materials[index]);
-                let new = self.at(old, [x, y, z]);
+                let new = self.change.at_point(old, [x, y, z]);
                 if new != old {
                     samples.weights[index] = new.weight;
                     samples.materials[index] = new.material;
                     changed = Some((changed.map_or(x, |(first, _)| first), x));
-                    count(&mut edit, old, new, 1);
+                    let is_seen = self.border.is_none_or(|border| !border.excludes([x, y, z]));
+                    self.count(&mut edit, old, new, is_seen.into());
                 }
             }
             if let Some((first, last)) = changed {
@@ -165,19 +168,12 @@ impl Pass {
         ([y, z], x + cells * (dy + cells * dz))
     }
 
-    /// What becomes of `old` at `point`.
-    #[inline]
-    fn at(&self, old: Voxel<i16>, point: [i32; 3]) -> Voxel<i16> {
-        let floor = self.border.as_ref().map_or(-EDIT_LIMIT, |border| border.clip(point, -EDIT_LIMIT));
-        self.change.at_point(old, point, floor)
-    }
-}
-
-/// Counts `samples` that changed alike.
-fn count(edit: &mut Edit, old: Voxel<i16>, new: Voxel<i16>, samples: u64) {
-    match (old.weight < 0, new.weight < 0) {
-        (false, true) => edit.added.add(new.material, samples),
-        (true, false) => edit.removed.add(old.material, samples),
-        _ => {}
+    /// Counts `samples` that changed alike.
+    fn count(&self, edit: &mut Edit, old: Voxel<i16>, new: Voxel<i16>, samples: u64) {
+        match [old, new].map(|voxel| self.change.is_solid(voxel.weight)) {
+            [false, true] => edit.added.add(new.material, samples),
+            [true, false] => edit.removed.add(old.material, samples),
+            _ => {}
+        }
     }
 }

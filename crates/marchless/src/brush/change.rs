@@ -11,6 +11,8 @@ pub(super) struct Change {
     operation: Operation,
     material: u8,
     stroke: Option<Stroke>,
+    /// The least weight that is not solid.
+    isovalue: i16,
     /// The range of distances within which they make a difference.
     low: i32,
     high: i32,
@@ -19,41 +21,51 @@ pub(super) struct Change {
 impl Change {
     pub(super) fn new(stamp: &Stamp) -> Self {
         let Stamp { operation, material, stroke, .. } = *stamp;
+        let isovalue = stamp.isovalue.clamp(-Stamp::MAX_ISOVALUE, Stamp::MAX_ISOVALUE);
         let low = match (operation, &stroke) {
             (Operation::Paint, _) => -1,
             (_, Some(stroke)) => -rim(stroke),
             (_, None) => -i32::from(EDIT_LIMIT),
         };
-        Self { shape: stamp.shape.limited(), operation, material, stroke, low, high: stamp.reach() as i32 }
+        Self { shape: stamp.shape.limited(), operation, material, stroke, isovalue, low, high: stamp.reach() as i32 }
     }
 
-    /// What becomes of `old` at `point`. `floor`: the least weight that an edit may leave there, not below
-    /// −[`EDIT_LIMIT`].
+    /// What becomes of `old` at `point`.
     #[inline]
-    pub(super) fn at_point(&self, old: Voxel<i16>, point: [i32; 3], floor: i16) -> Voxel<i16> {
-        if self.leaves(old, floor) {
+    pub(super) fn at_point(&self, old: Voxel<i16>, point: [i32; 3]) -> Voxel<i16> {
+        if self.leaves(old) {
             return old;
         }
-        self.at_distance(old, self.shape.distance_within(point, self.low, self.high), floor)
+        self.at_distance(old, self.shape.distance_within(point, self.low, self.high))
     }
 
     /// Whether `old` stays as it is at any distance.
     #[inline]
-    pub(super) fn leaves(&self, old: Voxel<i16>, floor: i16) -> bool {
+    pub(super) fn leaves(&self, old: Voxel<i16>) -> bool {
         match self.operation {
-            Operation::Add => old.weight <= floor,
-            Operation::Dig => old.weight >= EDIT_LIMIT,
-            Operation::Paint => old.weight >= 0 || old.material == self.material,
+            Operation::Add => old.weight <= self.isovalue - EDIT_LIMIT,
+            Operation::Dig => old.weight >= self.isovalue + EDIT_LIMIT,
+            Operation::Paint => !self.is_solid(old.weight) || old.material == self.material,
         }
+    }
+
+    /// Whether a surface at the stamp's isovalue has the weight inside.
+    #[inline]
+    pub(super) const fn is_solid(&self, weight: i16) -> bool {
+        weight < self.isovalue
     }
 
     /// What becomes of `old` at a `distance` from the shape, clamped to the range of this change.
     #[inline]
-    pub(super) fn at_distance(&self, old: Voxel<i16>, distance: i32, floor: i16) -> Voxel<i16> {
-        let clamp = |weight: i32| weight.clamp(floor.into(), EDIT_LIMIT.into());
-        let now = clamp(old.weight.into());
+    pub(super) fn at_distance(&self, old: Voxel<i16>, distance: i32) -> Voxel<i16> {
+        let (isovalue, limit) = (i32::from(self.isovalue), i32::from(EDIT_LIMIT));
+        // Distances from the surface at the isovalue.
+        let clamp = |from_surface: i32| from_surface.clamp(-limit, limit);
+        let now = clamp(i32::from(old.weight) - isovalue);
         let (new, material) = match (self.operation, &self.stroke) {
-            (Operation::Paint, _) if distance < 0 && old.weight < 0 => return Voxel::new(old.weight, self.material),
+            (Operation::Paint, _) if distance < 0 && self.is_solid(old.weight) => {
+                return Voxel::new(old.weight, self.material);
+            }
             (Operation::Paint, _) => return old,
             (Operation::Add, None) => (clamp(distance).min(now), self.material),
             (Operation::Add, Some(stroke)) => (clamp(now - moved(stroke, distance)), self.material),
@@ -63,8 +75,8 @@ impl Change {
         if new == now {
             return old;
         }
-        let becomes_solid = old.weight >= 0 && new < 0;
-        Voxel::new(new as i16, if becomes_solid { material } else { old.material })
+        let becomes_solid = !self.is_solid(old.weight) && new < 0;
+        Voxel::new((isovalue + new) as i16, if becomes_solid { material } else { old.material })
     }
 
     /// The clamped distance of all points of `area`, where a glance shows that it is one and the same.

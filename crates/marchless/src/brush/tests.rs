@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     grid::{Chunk, Grid, SpareSamples},
-    sample::Voxel,
+    sample::{Voxel, Weight as _},
 };
 
 const CELLS: u32 = 8;
@@ -93,8 +93,10 @@ fn stroke() -> impl Strategy<Value = Stroke> {
 }
 
 fn stamp() -> impl Strategy<Value = Stamp> {
-    (small_shape(), operation(), 0u8..5, prop::option::of(stroke()))
-        .prop_map(|(shape, operation, material, stroke)| Stamp { shape, operation, material, stroke })
+    let isovalue = prop_oneof![3 => Just(0), 3 => -700..700i16, 1 => any::<i16>()];
+    (small_shape(), operation(), 0u8..5, prop::option::of(stroke()), isovalue).prop_map(
+        |(shape, operation, material, stroke, isovalue)| Stamp { shape, operation, material, stroke, isovalue },
+    )
 }
 
 /// The distance as a textbook has it, in units.
@@ -118,12 +120,14 @@ fn distance_oracle(shape: &BrushShape, point: [i32; 3]) -> f64 {
 }
 
 /// What a stamp makes of a sample, straight from its definition.
-fn change_oracle(stamp: &Stamp, old: Voxel, point: [i32; 3], floor: i32) -> Voxel {
+fn change_oracle(stamp: &Stamp, old: Voxel, point: [i32; 3]) -> Voxel {
     let distance = stamp.shape.distance(point);
-    let clamp = |weight: i32| weight.clamp(floor, 1024);
-    let now = clamp(old.weight.into());
+    let isovalue = i32::from(stamp.isovalue).clamp(-31_743, 31_743);
+    let from_surface = i32::from(old.weight) - isovalue;
+    let clamp = |from_surface: i32| from_surface.clamp(-1024, 1024);
+    let now = clamp(from_surface);
     if stamp.operation == Operation::Paint {
-        return if old.weight < 0 && distance < 0 { Voxel::new(old.weight, stamp.material) } else { old };
+        return if from_surface < 0 && distance < 0 { Voxel::new(old.weight, stamp.material) } else { old };
     }
     let new = match stamp.stroke {
         None if stamp.operation == Operation::Add => clamp(now.min(distance)),
@@ -136,15 +140,14 @@ fn change_oracle(stamp: &Stamp, old: Voxel, point: [i32; 3], floor: i32) -> Voxe
             clamp(if stamp.operation == Operation::Add { now - moved } else { now + moved })
         }
     };
-    let weight = if new == now { old.weight } else { new as i16 };
-    Voxel::new(weight, if old.weight >= 0 && weight < 0 { stamp.material } else { old.material })
+    let weight = if new == now { old.weight } else { (isovalue + new) as i16 };
+    Voxel::new(weight, if from_surface >= 0 && new < 0 { stamp.material } else { old.material })
 }
 
-/// The least weight at a point of the bounded test grid.
-fn floor_oracle(point: [i32; 3]) -> i32 {
+/// How many points inside of the nearest outermost plane of the bounded test grid a point lies.
+fn depth(point: [i32; 3]) -> i32 {
     let cells = CELLS as i32;
-    let depth = (0..3).map(|i| (point[i] - BOUNDS.min[i] * cells).min(BOUNDS.max[i] * cells - point[i])).min().unwrap();
-    if depth <= 4 { 128 - 256 * depth } else { -1024 }
+    (0..3).map(|i| (point[i] - BOUNDS.min[i] * cells).min(BOUNDS.max[i] * cells - point[i])).min().unwrap()
 }
 
 /// The smallest region that holds all the points where `before` and `after` differ.
@@ -219,9 +222,10 @@ proptest! {
             let after = read(&grid);
             let mut volumes = [VolumeByMaterial::new(), VolumeByMaterial::new()];
             for (point, (old, new)) in all_points().zip(before.iter().zip(&after)) {
-                let floor = if bounded { floor_oracle(point) } else { -1024 };
-                prop_assert_eq!(*new, change_oracle(stamp, *old, point, floor), "{:?} was {:?}", point, old);
-                match (old.weight < 0, new.weight < 0) {
+                prop_assert_eq!(*new, change_oracle(stamp, *old, point), "{:?} was {:?}", point, old);
+                let is_solid = |voxel: &Voxel| i32::from(voxel.weight) < i32::from(stamp.isovalue).clamp(-31_743, 31_743);
+                match (is_solid(old), is_solid(new)) {
+                    _ if bounded && depth(point) <= 0 => {}
                     (false, true) => volumes[0].add(new.material, 1),
                     (true, false) => volumes[1].add(old.material, 1),
                     _ => {}
@@ -242,16 +246,40 @@ proptest! {
     }
 
     #[test]
-    fn bounded_grids_stay_closed(seed: u64, stamps in prop::collection::vec(stamp(), 1..6)) {
+    fn bounded_grids_look_closed(seed: u64, isovalue in -3.0..3.0f32, stamps in prop::collection::vec(stamp(), 1..6)) {
         let mut grid = grid(seed, true);
         for stamp in &stamps {
             grid.apply(stamp);
         }
         prop_assert_eq!(grid.chunks().count(), 8);
         for point in all_points() {
-            let weight = i32::from(grid.get(point).weight);
-            prop_assert!(floor_oracle(point) == -1024 || weight >= floor_oracle(point), "{point:?}: {weight}");
+            let weight = grid.as_meshed(point, isovalue).weight.to_voxels();
+            let least = isovalue + 0.5 - depth(point) as f32;
+            prop_assert!(depth(point) > 4 || weight > least - 0.01, "{point:?}: {weight}");
+            prop_assert!(weight >= isovalue || depth(point) > 0, "{point:?} is inside");
         }
+    }
+
+    #[test]
+    fn a_stamp_is_at_home_at_any_isovalue(
+        seed: u64, isovalue in -700i16..700, stamp in stamp(), voxels in -2.0..2.0f32, weight: i16,
+    ) {
+        // All weights and the isovalue higher by as much: so is what comes out.
+        let (mut low, mut high) = (grid(seed, false), grid(seed, false));
+        for point in all_points() {
+            let Voxel { weight, material } = low.get(point);
+            high.set(point, Voxel::new(weight.saturating_add(isovalue), material)).unwrap();
+        }
+        let edits = [low.apply(&Stamp { isovalue: 0, ..stamp }), high.apply(&Stamp { isovalue, ..stamp })];
+        for point in all_points().filter(|point| low.chunk(low.chunk_of(*point)).is_some()) {
+            let (low, high) = (low.get(point), high.get(point));
+            prop_assert!(low.weight == i16::MAX || low.weight + isovalue == high.weight, "at {point:?}: {low:?}, {high:?}");
+        }
+        prop_assert_eq!(&edits[0], &edits[1]);
+        // What is solid to a stamp is what a mesh has inside.
+        use crate::sample::private::Sealed as _;
+        let stamp = stamp.with_isovalue(voxels);
+        prop_assert_eq!(weight.inside(i16::threshold(voxels)), weight < stamp.isovalue);
     }
 
     #[test]
@@ -331,10 +359,11 @@ proptest! {
             prop_oneof![Just(0), Just(u64::MAX), any::<u64>()],
         )),
         seed: u64,
+        isovalue: i16,
         point in prop::array::uniform3(prop_oneof![Just(i32::MIN), Just(i32::MAX), any::<i32>()]),
     ) {
         let stroke = stroke.map(|(rate, falloff, start_us, end_us)| Stroke { id: 0, rate, falloff, start_us, end_us });
-        let stamp = Stamp { shape, operation, material: 1, stroke };
+        let stamp = Stamp { shape, operation, material: 1, stroke, isovalue };
         let mut grid = grid(seed, true);
         grid.apply(&stamp);
         stamp.shape.distance(point);

@@ -43,8 +43,8 @@ impl<W: Weight> Neighbourhood<W> {
     }
 
     /// [`NeighbourhoodView::block`].
-    pub fn block(&self, out: &mut Block<W>) {
-        self.view().block(out);
+    pub fn block(&self, isovalue: f32, out: &mut Block<W>) {
+        self.view().block(isovalue, out);
     }
 
     /// [`NeighbourhoodView::mesh`].
@@ -101,9 +101,9 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         self.beyond >> index & 1 == 1
     }
 
-    /// Gathers the samples that the chunk's mesh is made from: its own, one layer below and two above.
-    /// Allocates nothing once `out` has held a block of this size.
-    pub fn block(&self, out: &mut Block<W>) {
+    /// Gathers the samples that the chunk's mesh at `isovalue` is made from: its own, one layer below and two above; at the
+    /// border of a bounded grid, intersected with its box. Allocates nothing once `out` has held a block of this size.
+    pub fn block(&self, isovalue: f32, out: &mut Block<W>) {
         let n = self.cells as usize;
         out.resize(self.cells);
         // Where each of three neighbours along an axis lies in the block, from which of its samples on, and how many.
@@ -133,10 +133,16 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
             let spans = [spans[index % 3], spans[index / 3 % 3], spans[index / 9]];
             out.rows(spans, |[x, y, z], weights, materials| {
                 for (i, (weight, material)) in weights.iter_mut().zip(materials).enumerate() {
-                    let voxel = self.beyond([x + i, y, z]);
+                    let voxel = self.beyond([x + i, y, z], isovalue);
                     (*weight, *material) = (voxel.weight, voxel.material);
                 }
             });
+        }
+        // Blocks of chunks within do not reach what is clipped.
+        if let Some(border) = &self.border
+            && self.beyond != 0
+        {
+            out.clip(border, self.origin.map(|v| v - 1), isovalue);
         }
     }
 
@@ -156,17 +162,16 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
             out.clear();
             return Ok(());
         }
-        self.block(block);
-        if let Some(border) = self.border.and_then(|border| border.raised(settings.isovalue)) {
-            block.clip(&border, self.origin.map(|v| v - 1));
-        }
+        self.block(settings.isovalue, block);
         mesher.mesh(block.samples(), settings, out)
     }
 
     /// The voxel at a point of the block that lies beyond the bounds.
-    fn beyond(&self, point: [usize; 3]) -> Voxel<W> {
+    fn beyond(&self, point: [usize; 3], isovalue: f32) -> Voxel<W> {
         match &self.border {
-            Some(border) => border.beyond(core::array::from_fn(|axis| self.origin[axis] - 1 + point[axis] as i64)),
+            Some(border) => {
+                border.beyond(core::array::from_fn(|axis| self.origin[axis] - 1 + point[axis] as i64), isovalue)
+            }
             None => Voxel::AIR,
         }
     }
@@ -196,9 +201,9 @@ impl<W: Weight> Block<W> {
     }
 
     /// Intersects the samples with a border. `origin`: the block's lowest lattice point.
-    fn clip(&mut self, border: &Border, origin: [i64; 3]) {
+    fn clip(&mut self, border: &Border, origin: [i64; 3], isovalue: f32) {
         let size = self.shape.size()[0] as usize;
-        for (axis, layer, least) in border.layers::<W>(origin, size) {
+        for (axis, layer, least) in border.layers::<W>(origin, size, isovalue) {
             for index in layer_indices(axis, layer, size) {
                 self.weights[index] = larger(self.weights[index], least);
             }

@@ -1,8 +1,9 @@
-//! The border of a bounded grid: a box half a voxel inside its outermost planes, with which every sample written
-//! is intersected, so that the surface is closed and its walls are flat.
+//! The border of a bounded grid: a box half a voxel inside its outermost planes, with which every sample is intersected
+//! as it is read for a mesh or a ray, so that the surface is closed and its walls are flat.
 //!
-//! A sample `k` points inside of the nearest plane (0 on it, negative beyond it) weighs at least `0.5 − k` voxels.
-//! That is exact in every weight's steps, and a maximum: clipping twice, or layer by layer, changes nothing.
+//! To a surface at an isovalue, a sample `k` points inside of the nearest plane (0 on it, negative beyond it) weighs at
+//! least `isovalue + 0.5 − k` voxels. That is a maximum: clipping twice, or layer by layer, changes nothing. The samples
+//! themselves know no border, so that it may move.
 
 use crate::lattice::Region;
 use crate::sample::{Voxel, Weight};
@@ -15,20 +16,12 @@ const DEPTH: i64 = 4;
 pub(crate) struct Border {
     min: [i64; 3],
     max: [i64; 3],
-    /// The isovalue at which the box lies where it does, in voxels.
-    isovalue: f32,
 }
 
 impl Border {
     /// `planes`: [`crate::Grid::planes`].
     pub(crate) fn new(planes: Region) -> Self {
-        Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from), isovalue: 0.0 }
-    }
-
-    /// The border that surfaces at `isovalue` need on top, so that beyond it all is outside for them too. `None` where
-    /// the samples as they are written suffice.
-    pub(crate) fn raised(self, isovalue: f32) -> Option<Self> {
-        (isovalue > 0.0).then_some(Self { isovalue, ..self })
+        Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from) }
     }
 
     /// Whether some point of `region` is clipped.
@@ -38,25 +31,35 @@ impl Border {
         ends.iter().any(|end| self.depth(end.map(i64::from)) <= DEPTH)
     }
 
-    /// What is read at a point that no chunk of the grid owns.
-    pub(super) fn beyond<W: Weight>(&self, point: [i64; 3]) -> Voxel<W> {
-        Voxel::new(self.wall(self.depth(point)), 0)
+    /// Whether a point lies on an outermost plane or beyond: no surface has it inside.
+    pub(crate) fn excludes(&self, point: [i32; 3]) -> bool {
+        self.depth(point.map(i64::from)) <= 0
     }
 
-    /// `weight`, intersected with the box at `point`.
-    pub(crate) fn clip<W: Weight>(&self, point: [i32; 3], weight: W) -> W {
+    /// What a surface at `isovalue` reads at a point that no chunk of the grid owns.
+    pub(super) fn beyond<W: Weight>(&self, point: [i64; 3], isovalue: f32) -> Voxel<W> {
+        Voxel::new(wall(self.depth(point), isovalue), 0)
+    }
+
+    /// `weight`, intersected with the box at `point`, as a surface at `isovalue` reads it.
+    pub(crate) fn clip<W: Weight>(&self, point: [i32; 3], weight: W, isovalue: f32) -> W {
         let depth = self.depth(point.map(i64::from));
-        if depth > DEPTH { weight } else { larger(weight, self.wall(depth)) }
+        if depth > DEPTH { weight } else { larger(weight, wall(depth, isovalue)) }
     }
 
     /// Every layer of a cube of `size` samples per axis that is clipped: its axis, its index along that axis, and the
     /// least weight in it. `origin`: the cube's lowest lattice point.
-    pub(super) fn layers<W: Weight>(&self, origin: [i64; 3], size: usize) -> impl Iterator<Item = (usize, usize, W)> {
+    pub(super) fn layers<W: Weight>(
+        &self,
+        origin: [i64; 3],
+        size: usize,
+        isovalue: f32,
+    ) -> impl Iterator<Item = (usize, usize, W)> {
         let border = *self;
         (0..3).flat_map(move |axis| {
             (0..size).filter_map(move |index| {
                 let depth = border.depth_along(axis, origin[axis] + index as i64);
-                (depth <= DEPTH).then(|| (axis, index, border.wall(depth)))
+                (depth <= DEPTH).then(|| (axis, index, wall(depth, isovalue)))
             })
         })
     }
@@ -69,11 +72,11 @@ impl Border {
     fn depth_along(&self, axis: usize, coordinate: i64) -> i64 {
         (coordinate - self.min[axis]).min(self.max[axis] - coordinate)
     }
+}
 
-    /// The weight of the box itself, `depth` points inside of its nearest plane.
-    fn wall<W: Weight>(&self, depth: i64) -> W {
-        W::from_voxels(self.isovalue + 0.5 - depth as f32)
-    }
+/// The weight of the box itself, `depth` points inside of its nearest plane.
+fn wall<W: Weight>(depth: i64, isovalue: f32) -> W {
+    W::from_voxels(isovalue + 0.5 - depth as f32)
 }
 
 /// The indices of layer `layer` across `axis` of a cube of `size` samples per axis.
@@ -94,21 +97,25 @@ mod tests {
 
     #[test]
     fn walls_are_exact_in_steps() {
-        let border = Border::new(Region::new([0; 3], [16; 3]));
         for depth in 0..=DEPTH {
-            assert_eq!(i64::from(border.wall::<i16>(depth)), 128 - 256 * depth);
-            assert_eq!(i64::from(border.wall::<i8>(depth)), 16 - 32 * depth);
+            for isovalue in [-2.0, 0.0, 3.0] {
+                let steps = isovalue as i64 * 2 + 1 - 2 * depth; // in halves of a voxel
+                assert_eq!(i64::from(wall::<i16>(depth, isovalue)), 128 * steps);
+                assert_eq!(i64::from(wall::<i8>(depth, isovalue)), (16 * steps).max(-128));
+            }
         }
-        assert_eq!(border.wall::<i8>(-1), 48);
-        assert_eq!(border.wall::<i8>(i64::MIN / 2), i8::MAX);
+        assert_eq!(wall::<i8>(-1, 0.0), 48);
+        assert_eq!(wall::<i8>(i64::MIN / 2, 0.0), i8::MAX);
     }
 
     #[test]
     fn clipping_reaches_four_points_deep() {
         let border = Border::new(Region::new([0; 3], [16; 3]));
-        let clipped = |x| border.clip([x, 8, 8], i16::MIN);
+        let clipped = |x| border.clip([x, 8, 8], i16::MIN, 0.0);
         assert_eq!([clipped(0), clipped(1), clipped(4), clipped(5)], [128, -128, 128 - 4 * 256, i16::MIN]);
         assert_eq!([clipped(16), clipped(15), clipped(11)], [128, -128, i16::MIN]);
-        assert_eq!(border.clip([3, 15, 8], 500i16), 500);
+        assert_eq!(border.clip([3, 15, 8], 500i16, 0.0), 500);
+        assert_eq!(border.clip([0, 8, 8], i16::MIN, 2.0), 128 + 512);
+        assert!(border.excludes([0, 8, 8]) && border.excludes([8, 17, 8]) && !border.excludes([1, 15, 8]));
     }
 }

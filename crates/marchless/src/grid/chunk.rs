@@ -4,7 +4,6 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::border::{Border, larger, layer_indices};
 use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples};
 use crate::sample::{Voxel, Weight};
 use crate::source::{BOUND_MARGIN, Bound, Source, SourceRegion};
@@ -186,24 +185,6 @@ impl<W: Weight> Chunk<W> {
         match self {
             Self::Samples(samples) => spare.make_mut(samples),
             Self::Uniform(_) => unreachable!("written out above"),
-        }
-    }
-
-    /// Intersects the samples with the border of a bounded grid. `origin`: the chunk's lowest lattice point.
-    pub(crate) fn clip(&mut self, origin: [i32; 3], cells: u32, border: &Border) {
-        let size = cells as usize;
-        for (axis, layer, least) in border.layers::<W>(origin.map(i64::from), size) {
-            // Looking first leaves shared samples shared, and a uniform chunk uniform, where nothing changes.
-            let below = match self {
-                Self::Uniform(voxel) => voxel.weight < least,
-                Self::Samples(samples) => layer_indices(axis, layer, size).any(|index| samples.weights[index] < least),
-            };
-            if below {
-                let weights = &mut self.samples_mut(cells, &mut SpareSamples::new()).weights;
-                for index in layer_indices(axis, layer, size) {
-                    weights[index] = larger(weights[index], least);
-                }
-            }
         }
     }
 

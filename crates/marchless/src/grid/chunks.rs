@@ -24,6 +24,10 @@ impl<W: Weight> Chunks<W> {
         self.map.get(&position)
     }
 
+    pub(super) fn get_mut(&mut self, position: [i32; 3]) -> Option<&mut Chunk<W>> {
+        self.map.get_mut(&position)
+    }
+
     /// The chunk at `position`, made of air where it is absent.
     pub(super) fn get_mut_or_air(&mut self, position: [i32; 3]) -> &mut Chunk<W> {
         match self.map.entry(position) {

@@ -10,6 +10,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::border::Border;
 use super::{Chunk, Grid};
 use crate::bits::BitGrid;
 use crate::lattice::{Region, Samples, Shape};
@@ -27,7 +28,7 @@ impl<W: Weight> Grid<W> {
     /// ([`Chunk::AIR`], where it was absent). `settings`: of the meshes.
     ///
     /// `None` where that is not looked into: for boxes of more than 60 points along an axis, isovalues that are not
-    /// finite, and isovalues above zero at the border of a bounded grid.
+    /// finite, and isovalues beyond the weights' range at the border of a bounded grid.
     pub fn chunks_redrawn(
         &self,
         before: &BTreeMap<[i32; 3], Chunk<W>>,
@@ -39,20 +40,20 @@ impl<W: Weight> Grid<W> {
         }
         let read = changed.grown(REACH, REACH);
         let fits = (0..3).all(|axis| changed.size()[axis] + 2 * REACH == read.size()[axis] && read.size()[axis] <= 64);
-        let raised = self.border().and_then(|border| border.raised(settings.isovalue));
-        if !fits || raised.is_some_and(|border| border.reaches(&read)) {
+        let (threshold, border) =
+            (W::threshold(settings.isovalue), self.border().filter(|border| border.reaches(&read)));
+        if !fits || border.is_some() && W::OUTSIDE.inside(threshold) {
             return None;
         }
         let shape = Shape::new(read.size()).ok()?;
-        let weights = self.weights(read, shape);
+        let weights = self.weights(read, shape, border);
         let signs = BitGrid::from_samples(Samples::new(shape, &weights).ok()?, settings.isovalue).ok()?;
         let now = signs.words();
         let mut rows = Rows { read, now, before: now.to_vec(), changed: vec![0; now.len()] };
-        let threshold = W::threshold(settings.isovalue);
         let air = Chunk::AIR;
         for (position, old) in before {
             let new = self.chunk(*position).unwrap_or(&air);
-            rows.compare(old, new, self.chunk_region(*position), changed, threshold);
+            rows.compare(old, new, self.chunk_region(*position), changed, threshold, border);
         }
         let shows = rows.shows(changed, settings.topology);
         let is_redrawn = |position: &[i32; 3]| {
@@ -62,14 +63,14 @@ impl<W: Weight> Grid<W> {
         Some(self.chunks_affected_by(changed).points().filter(is_redrawn).collect())
     }
 
-    /// The weights of a box, x fastest.
-    fn weights(&self, region: Region, shape: Shape) -> Vec<W> {
+    /// The weights of a box, x fastest; outside where the border lets no surface be. Elsewhere it changes no sign.
+    fn weights(&self, region: Region, shape: Shape, border: Option<Border>) -> Vec<W> {
         let mut weights = vec![W::OUTSIDE; shape.len()];
         let [_, along_y, along_z] = shape.strides();
         let (first, last) = (self.chunk_of(region.min), self.chunk_of(region.max.map(|v| v - 1)));
         for position in Region::new(first, last).grown(0, 1).points() {
             let part = self.chunk_region(position).intersection(&region);
-            let chunk = self.chunk(position);
+            let chunk = self.seen_chunk(position);
             for z in part.min[2]..part.max[2] {
                 for y in part.min[1]..part.max[1] {
                     let [dx, dy, dz] = [part.min[0] - region.min[0], y - region.min[1], z - region.min[2]];
@@ -81,10 +82,11 @@ impl<W: Weight> Grid<W> {
                             row.copy_from_slice(&samples.weights[from..from + row.len()]);
                         }
                         Some(Chunk::Uniform(voxel)) => row.fill(voxel.weight),
-                        None => {
-                            for (weight, x) in row.iter_mut().zip(part.min[0]..) {
-                                *weight = self.get([x, y, z]).weight;
-                            }
+                        None => {}
+                    }
+                    for (weight, x) in row.iter_mut().zip(part.min[0]..) {
+                        if border.is_some_and(|border| border.excludes([x, y, z])) {
+                            *weight = W::OUTSIDE;
                         }
                     }
                 }
@@ -113,6 +115,7 @@ impl Rows<'_> {
         chunk: Region,
         within: Region,
         threshold: W::Threshold,
+        border: Option<Border>,
     ) {
         let [nx, ny, _] = chunk.size().map(|size| size as usize);
         let part = chunk.intersection(&within);
@@ -122,6 +125,7 @@ impl Rows<'_> {
         let (mut old_room, mut new_room) = (([W::OUTSIDE; 64], [0; 64]), ([W::OUTSIDE; 64], [0; 64]));
         let (len, first_bit) = (part.size()[0] as usize, part.min[0] - self.read.min[0]);
         for (row, [y, z], _) in self.rows_of(part) {
+            let may_flip = |bit: usize| border.is_none_or(|border| !border.excludes([part.min[0] + bit as i32, y, z]));
             let [dx, dy, dz] = [part.min[0] - chunk.min[0], y - chunk.min[1], z - chunk.min[2]].map(|v| v as usize);
             let from = dx + nx * (dy + ny * dz);
             let (old_weights, old_materials) = row_of(old, from..from + len, &mut old_room);
@@ -130,7 +134,8 @@ impl Rows<'_> {
             if old_weights != new_weights {
                 for (bit, (old, new)) in old_weights.iter().zip(new_weights).enumerate() {
                     changed |= u64::from(old != new) << bit;
-                    flipped |= u64::from(old.inside(threshold) != new.inside(threshold)) << bit;
+                    let flips = old.inside(threshold) != new.inside(threshold) && may_flip(bit);
+                    flipped |= u64::from(flips) << bit;
                 }
             }
             if old_materials != new_materials {
@@ -277,7 +282,7 @@ mod tests {
             let topology = if exact { Topology::Trilinear } else { Topology::Separated };
             let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
             let redrawn = after.chunks_redrawn(&old, changed, &settings);
-            prop_assert!(redrawn.is_some() || bounded && isovalue > 0.0);
+            prop_assert!(redrawn.is_some());
             for position in affected.points() {
                 let looks_the_same = || mesh(&before, position, &settings) == mesh(&after, position, &settings);
                 let is_redrawn = redrawn.as_ref().is_none_or(|redrawn| redrawn.contains(&position));

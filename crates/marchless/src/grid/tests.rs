@@ -102,18 +102,20 @@ proptest! {
     }
 
     #[test]
-    fn blocks_hold_what_get_reads((grid, centre) in grid(), step in [-1..=1i32, -1..=1, -1..=1]) {
+    fn blocks_hold_samples_as_meshed(
+        (grid, centre) in grid(), step in [-1..=1i32, -1..=1, -1..=1], isovalue in prop_oneof![Just(0.0), -3.0..3.0f32],
+    ) {
         let mut block = Block::new();
         // An off-centre chunk has absent neighbours, and often lies beyond the bounds itself.
         for position in [centre, core::array::from_fn(|axis| centre[axis] + step[axis])] {
-            grid.neighbourhood(position).block(&mut block);
+            grid.neighbourhood(position).block(isovalue, &mut block);
             let samples = block.samples();
             let region = block_region(position, grid.chunk_cells());
             prop_assert_eq!(samples.shape().size(), region.size());
             prop_assert!(samples.is_padded());
             for (index, point) in region.points().enumerate() {
                 let found = Voxel::new(samples.weights()[index], samples.materials().unwrap()[index]);
-                prop_assert_eq!(found, grid.get(point), "at {:?} of chunk {:?}", point, position);
+                prop_assert_eq!(found, grid.as_meshed(point, isovalue), "at {:?} of chunk {:?}", point, position);
             }
         }
     }
@@ -130,11 +132,13 @@ proptest! {
             for position in around(centre).points() {
                 let neighbourhood = grid.neighbourhood(position);
                 let mut block = Block::new();
-                neighbourhood.block(&mut block);
+                neighbourhood.block(0.0, &mut block);
                 let weights = block.samples().weights();
                 let one_weight = weights.iter().all(|weight| *weight == weights[0]);
                 if neighbourhood.is_uniform() {
                     for isovalue in [-3.0, 0.0, 0.5] {
+                        let mut block = Block::new();
+                        neighbourhood.block(isovalue, &mut block);
                         let settings = MeshSettings { isovalue, ..MeshSettings::default() };
                         let mut mesh = MeshBuffer::new();
                         Mesher::new().mesh(block.samples(), &settings, &mut mesh).unwrap();
@@ -148,32 +152,46 @@ proptest! {
     }
 
     #[test]
-    fn inserting_clips_as_setting_does((grid, _) in grid()) {
-        if let Some(bounds) = grid.bounds() {
-            for position in bounds.points().take(8) {
-                let chunk = noise_chunk(position[0] as u64 ^ 77, (grid.chunk_cells() as usize).pow(3));
-                let (mut inserted, mut set) = (grid.clone(), grid.clone());
-                inserted.insert(position, chunk.clone()).unwrap();
-                for (index, point) in grid.chunk_region(position).points().enumerate() {
-                    set.set(point, chunk.voxel(index)).unwrap();
-                }
-                prop_assert_eq!(inserted.chunk(position), set.chunk(position));
-            }
-        }
-    }
-
-    #[test]
-    fn bounded_grids_keep_their_walls((grid, centre) in grid(), chunk_voxel in voxel()) {
+    fn bounded_grids_look_as_if_walled((grid, centre) in grid(), chunk_voxel in voxel(), isovalue in -2..3i16) {
         let mut grid = grid;
         let Some(planes) = grid.planes() else { return Ok(()) };
         grid.insert(centre, Chunk::Uniform(chunk_voxel)).unwrap();
         for point in grid.chunk_region(centre).points() {
             let depth = (0..3).map(|axis| (point[axis] - planes.min[axis]).min(planes.max[axis] - point[axis]));
             let depth = depth.min().unwrap();
-            let least = if depth <= 4 { 128 - 256 * depth as i16 } else { i16::MIN };
-            prop_assert_eq!(grid.get(point).weight, chunk_voxel.weight.max(least));
-            prop_assert_eq!(grid.get(point).material, chunk_voxel.material);
+            let least = if depth <= 4 { 256 * isovalue + 128 - 256 * depth as i16 } else { i16::MIN };
+            let expected = Voxel::new(chunk_voxel.weight.max(least), chunk_voxel.material);
+            prop_assert_eq!(grid.as_meshed(point, isovalue.into()), expected);
+            prop_assert_eq!(grid.get(point), chunk_voxel, "as it was written");
         }
+    }
+
+    #[test]
+    fn other_bounds_are_as_if_there_had_been_no_others(
+        (grid, centre) in grid(), margins in proptest::option::of(([0..3i32, 0..3, 0..3], [1..3i32, 1..3, 1..3])),
+    ) {
+        let bounds = margins.map(|(low, high)| {
+            Region::new([0, 1, 2].map(|i| centre[i] - low[i]), [0, 1, 2].map(|i| centre[i] + high[i]))
+        });
+        let mut moved = grid.clone();
+        moved.take_dirty();
+        moved.set_bounds(bounds).unwrap();
+        let mut fresh = bounds.map_or_else(|| Grid::new(grid.chunk_cells()), |b| Grid::bounded(grid.chunk_cells(), b)).unwrap();
+        for (position, chunk) in grid.chunks().filter(|(position, _)| bounds.is_none_or(|b| b.contains(*position))) {
+            fresh.insert(position, chunk.clone()).unwrap();
+        }
+        let (mut mesher, mut meshes) = (Mesher::new(), [const { MeshBuffer::new() }; 3]);
+        for position in around(centre).grown(1, 1).points() {
+            let settings = MeshSettings::default();
+            for (grid, mesh) in [&grid, &moved, &fresh].into_iter().zip(&mut meshes) {
+                grid.mesh_chunk(position, &mut mesher, &settings, mesh).unwrap();
+            }
+            prop_assert_eq!(&meshes[1], &meshes[2], "{:?}", position);
+            let is_seen = bounds.is_none_or(|bounds| bounds.contains(position));
+            prop_assert!(!is_seen || meshes[0] == meshes[1] || moved.dirty().contains(&position), "{position:?}");
+        }
+        moved.set_bounds(grid.bounds()).unwrap();
+        prop_assert!(grid.chunks().eq(moved.chunks()), "nothing is lost");
     }
 
     #[test]
@@ -231,7 +249,7 @@ fn every_write_of_a_clone_leaves_the_original_alone() {
     let samples = |grid: &Grid| -> Vec<_> { Region::new([-8; 3], [24; 3]).points().map(|p| grid.get(p)).collect() };
     let before = samples(&original);
     let mut block_before = Block::new();
-    snapshot.block(&mut block_before);
+    snapshot.block(0.0, &mut block_before);
 
     grid.set([3, 3, 3], Voxel::new(9, 9)).unwrap();
     grid.set([9, 3, 3], Voxel::new(9, 9)).unwrap();
@@ -241,7 +259,7 @@ fn every_write_of_a_clone_leaves_the_original_alone() {
     assert_ne!(samples(&grid), before);
     assert_eq!(samples(&original), before);
     let mut block = Block::new();
-    snapshot.block(&mut block);
+    snapshot.block(0.0, &mut block);
     assert_eq!(block.samples().weights(), block_before.samples().weights());
     assert_eq!(grid.get([9, 3, 3]), Voxel::AIR, "a removed chunk reads as air");
 }
@@ -260,19 +278,17 @@ fn writing_what_is_there_changes_nothing() {
 }
 
 #[test]
-fn reading_and_clipping_copy_nothing() {
+fn reading_copies_nothing() {
     let mut grid = Grid::<i16>::bounded(8, Region::new([0; 3], [1; 3])).unwrap();
-    let shared = Arc::new(ChunkSamples { weights: (0..512).map(|i| 1000 + i).collect(), materials: vec![0; 512] });
+    let shared = Arc::new(ChunkSamples { weights: (0..512).map(|i| i - 1000).collect(), materials: vec![0; 512] });
     grid.insert([0; 3], Chunk::Samples(Arc::clone(&shared))).unwrap();
     let clone = grid.clone();
-    assert!(
-        matches!(clone.chunk([0; 3]), Some(Chunk::Samples(kept)) if Arc::ptr_eq(kept, &shared)),
-        "outside of the walls already"
-    );
+    grid.neighbourhood([0; 3]).block(0.0, &mut Block::new());
+    assert!(matches!(clone.chunk([0; 3]), Some(Chunk::Samples(kept)) if Arc::ptr_eq(kept, &shared)));
     grid.set([1, 2, 3], Voxel::new(0, 0)).unwrap();
     assert!(matches!(grid.chunk([0; 3]), Some(Chunk::Samples(kept)) if !Arc::ptr_eq(kept, &shared)));
-    grid.insert([0; 3], Chunk::AIR).unwrap();
-    assert_eq!(grid.chunk([0; 3]), Some(&Chunk::AIR), "air needs no samples at the border");
+    grid.insert([0; 3], Chunk::Uniform(Voxel::new(i16::MIN, 1))).unwrap();
+    assert!(matches!(grid.chunk([0; 3]), Some(Chunk::Uniform(_))), "rock needs no samples at the border");
 }
 
 #[test]
@@ -317,16 +333,16 @@ fn the_ends_of_the_lattice_are_reached_without_panic() {
                 assert_eq!(grid.get(point).material == 3, stored);
                 let _ = (grid.chunks_affected_by(Region::new(point, [b, a, b])), grid.chunk_region(point));
                 assert_eq!(grid.insert(point, Chunk::AIR).is_ok(), bounds.contains(point));
-                grid.neighbourhood(point).block(&mut block);
+                grid.neighbourhood(point).block(0.0, &mut block);
                 let _ = Chunk::<i16>::from_source(&|_| f64::NAN, point, cells, 1.0);
             }
             grid.take_dirty();
             grid.mark_dirty(Region::new([i32::MIN; 3], [i32::MAX; 3]));
             assert!(grid.chunks().all(|(position, _)| grid.dirty().contains(&position)));
             for position in [[limit - 1, 0, 0], [-limit, 0, 0]] {
-                grid.neighbourhood(position).block(&mut block);
+                grid.neighbourhood(position).block(0.0, &mut block);
                 for (index, point) in block_region(position, cells).points().enumerate() {
-                    assert_eq!(block.samples().weights()[index], grid.get(point).weight);
+                    assert_eq!(block.samples().weights()[index], grid.as_meshed(point, 0.0).weight);
                 }
             }
         }
