@@ -5,8 +5,14 @@
 mod check;
 #[path = "mesh_volume/chunks.rs"]
 mod chunks;
+#[path = "mesh_volume/close.rs"]
+mod close;
 #[path = "mesh_volume/exact.rs"]
 mod exact;
+#[path = "mesh_volume/layouts.rs"]
+mod layouts;
+#[path = "mesh_volume/origin.rs"]
+mod origin;
 #[path = "mesh_volume/program.rs"]
 mod program;
 #[path = "mesh_volume/readers.rs"]
@@ -222,6 +228,10 @@ fn the_surface_lies_between_the_same_samples_in_every_type() {
             "i16" => (-32768.0, 32767.0),
             "u16" => (0.0, 65535.0),
             "i32" => (-2147483648.0, 2147483647.0),
+            "u32" => (0.0, 4294967295.0),
+            // The largest that an f64 holds, too.
+            "i64" => (-9223372036854775808.0, 9223372036854774784.0),
+            "u64" => (0.0, 18446744073709549568.0),
             "f32" => (f64::from(f32::MIN), f64::from(f32::MAX)),
             _ => (f64::MIN, f64::MAX),
         };
@@ -259,11 +269,16 @@ fn random(seed: usize) -> f64 {
 
 /// That a weight lies below the weights' isovalue exactly where the sample lies below its own.
 fn assert_same_side<S: Sample>(bytes: &[u8], sample: f64, iso: f64) {
+    assert_side::<S>(bytes, sample < iso, iso);
+}
+
+/// That a weight lies below the weights' isovalue exactly where its sample does, as `is_below` says.
+fn assert_side<S: Sample>(bytes: &[u8], is_below: bool, iso: f64) {
     let mut weights = Vec::new();
     S::decode(bytes, iso, &mut weights);
     let isovalue = S::isovalue(iso);
     assert!(isovalue.is_finite() && weights.len() == 1);
-    assert_eq!(weights[0].to_voxels() < isovalue, sample < iso, "{sample:e} at {iso:e} became {:?}", weights[0]);
+    assert_eq!(weights[0].to_voxels() < isovalue, is_below, "{bytes:?} at {iso:e} became {:?}", weights[0]);
 }
 
 /// Isovalues of all kinds, and some that are close to the sample.
@@ -301,6 +316,34 @@ proptest! {
     #[test]
     fn long_integers_keep_their_side((sample, iso) in any::<i32>().prop_flat_map(|v| (Just(v), isovalue(v.into())))) {
         assert_same_side::<i32>(&sample.to_le_bytes(), sample.into(), iso);
+        let unsigned = sample.cast_unsigned();
+        assert_same_side::<u32>(&unsigned.to_le_bytes(), unsigned.into(), iso);
+        assert_same_side::<u32>(&unsigned.to_le_bytes(), unsigned.into(), iso + 4294967296.0);
+    }
+
+    #[test]
+    fn very_long_integers_keep_their_side(
+        (sample, iso) in any::<i64>().prop_flat_map(|v: i64| (Just(v), isovalue(v as f64))),
+        bits in 0..64u32,
+    ) {
+        // A whole number lies below another number exactly where it lies below the next whole number up.
+        let is_below = |sample: i128, iso: f64| sample < iso.ceil() as i128;
+        let unsigned = sample.cast_unsigned();
+        for iso in [iso, iso + 18446744073709551616.0] {
+            assert_side::<i64>(&sample.to_le_bytes(), is_below(sample.into(), iso), iso);
+            assert_side::<u64>(&unsigned.to_le_bytes(), is_below(unsigned.into(), iso), iso);
+        }
+        // Small ones and those beside the isovalue, too.
+        let iso = (sample >> bits) as f64 + iso.fract();
+        for sample in [-1, 0, 1].map(|step| (sample >> bits).saturating_add(step)) {
+            assert_side::<i64>(&sample.to_le_bytes(), is_below(sample.into(), iso), iso);
+        }
+    }
+
+    #[test]
+    fn truths_keep_their_side(byte: u8, iso in isovalue(1.0)) {
+        assert_same_side::<bool>(&[byte], f64::from(u8::from(byte != 0)), iso);
+        assert_same_side::<bool>(&[byte], f64::from(u8::from(byte != 0)), iso - 1.0);
     }
 
     #[test]

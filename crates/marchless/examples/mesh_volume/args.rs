@@ -7,13 +7,13 @@ use clap::Parser;
 
 use crate::error::Error;
 use crate::output::FORMATS;
-use crate::sample::SampleType;
+use crate::sample::{Endian, SampleType};
 
 /// Meshes the isosurface of a volume; what lies below the isovalue is inside.
 #[derive(Parser, Debug)]
 #[command(name = "mesh_volume")]
 pub(crate) struct Args {
-    /// The volume: plain little-endian samples, x fastest (.raw), or a NumPy array with the indices [z][y][x] (.npy).
+    /// The volume: plain samples, x fastest (.raw), or a NumPy array with the indices [z][y][x] (.npy).
     #[arg(value_name = "IN.{raw,npy}")]
     pub(crate) input: PathBuf,
 
@@ -25,7 +25,18 @@ pub(crate) struct Args {
     #[arg(long = "type", value_name = "TYPE")]
     pub(crate) sample_type: Option<SampleType>,
 
-    /// Where the surface lies, in the samples' own numbers.
+    /// The order of a sample's bytes, little if nothing is said; a .npy file says so itself.
+    #[arg(long, value_name = "ORDER")]
+    pub(crate) endian: Option<Endian>,
+
+    /// How many bytes of the file come before the samples, 0 if nothing is said; a .npy file says so itself.
+    #[arg(long, value_name = "BYTES", value_parser = bytes, allow_hyphen_values = true)]
+    pub(crate) skip: Option<u64>,
+
+    /// Where the surface lies, in the samples' own numbers; for bool 0.5, since false is 0 and true is 1.
+    ///
+    /// Samples of more than 16 bits are meshed by their difference to V in 32-bit floating point: it is rounded to 24
+    /// bits, though no sample changes sides. V itself is a 64-bit number, so that beyond 2^53 it may be rounded.
     #[arg(long, value_name = "V", value_parser = finite, default_value_t = 0.0, allow_hyphen_values = true)]
     pub(crate) iso: f64,
 
@@ -36,6 +47,19 @@ pub(crate) struct Args {
     /// How far apart neighbouring samples are along each axis.
     #[arg(long, value_name = "X,Y,Z", value_parser = spacing, default_value = "1,1,1", allow_hyphen_values = true)]
     pub(crate) spacing: [f64; 3],
+
+    /// The position of the first sample.
+    ///
+    /// Positions are 32-bit numbers: the farther from 0, the coarser they are rounded.
+    #[arg(long, value_name = "X,Y,Z", value_parser = origin, default_value = "0,0,0", allow_hyphen_values = true)]
+    pub(crate) origin: [f64; 3],
+
+    /// Close the surface where it leaves the volume.
+    ///
+    /// The space around the volume counts as outside: as above the isovalue, or with --invert as below it. Walls lie half
+    /// a sample beyond the outermost samples; beyond a sample that is equal to the isovalue, 1/1024 of one.
+    #[arg(long)]
+    pub(crate) close: bool,
 
     /// Where the signs of a cell's corners leave open what is joined, do as the trilinear interpolant has it, rather than
     /// separate what is inside.
@@ -51,7 +75,7 @@ pub(crate) struct Args {
 
     /// Print a report of the mesh's soundness; with any defect, write nothing and end with exit code 3.
     ///
-    /// Where the surface leaves the volume it may be open. Each chunk is examined by itself. The mesh is held in memory:
+    /// Where the surface leaves the volume it may be open, unless --close closes it. Each chunk is examined by itself. The mesh is held in memory:
     /// a layer of chunks at a time with --chunk, otherwise all of it. Examining it takes another 200 bytes a triangle.
     #[arg(long)]
     pub(crate) check: bool,
@@ -62,6 +86,11 @@ pub(crate) struct Args {
 }
 
 impl Args {
+    /// How many layers of samples the mesher gets around the volume.
+    pub(crate) const fn margin(&self) -> u32 {
+        self.close as u32
+    }
+
     /// Says what is wrong with the files' names and places, if anything is, before any work is done.
     ///
     /// # Errors
@@ -114,6 +143,10 @@ fn finite(text: &str) -> Result<f64, String> {
     number.filter(|number| number.is_finite()).ok_or_else(|| "it must be a finite number".to_owned())
 }
 
+fn bytes(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| format!("it must be a whole number of bytes from 0 to {}", u64::MAX))
+}
+
 fn cells(text: &str) -> Result<NonZeroU32, String> {
     text.trim().parse().map_err(|_| format!("it must be a whole number of cells from 1 to {}", u32::MAX))
 }
@@ -126,6 +159,11 @@ fn shape(text: &str) -> Result<[u32; 3], String> {
 fn spacing(text: &str) -> Result<[f64; 3], String> {
     three(text, |number| number.parse().ok().filter(|&gap: &f64| gap.is_finite() && gap > 0.0))
         .ok_or_else(|| "it must be three numbers above 0, with commas between them".to_owned())
+}
+
+fn origin(text: &str) -> Result<[f64; 3], String> {
+    three(text, |number| number.parse().ok().filter(|place: &f64| place.is_finite()))
+        .ok_or_else(|| "it must be three finite numbers, with commas between them".to_owned())
 }
 
 fn three<T>(text: &str, parse: impl Fn(&str) -> Option<T>) -> Option<[T; 3]> {

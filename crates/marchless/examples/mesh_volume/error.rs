@@ -1,5 +1,6 @@
 //! [`Error`]: why there is no mesh.
 
+use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
@@ -8,7 +9,7 @@ use thiserror::Error;
 
 use crate::npy::NpyError;
 use crate::output::OutputError;
-use crate::sample::SampleType;
+use crate::sample::{Endian, SampleType};
 
 /// Why there is no mesh, or not all is well, in one sentence. Whatever it is, no half-written file is left behind.
 #[derive(Debug, Error)]
@@ -40,9 +41,9 @@ pub(crate) enum Error {
     #[error("{} cannot be read: {source}", path.display())]
     Npy { path: PathBuf, source: NpyError },
 
-    #[error("{} has {} × {} × {} samples along x, y and z, but at least 2 along each are needed, and at most {}",
-        path.display(), size[0], size[1], size[2], u32::MAX)]
-    Size { path: PathBuf, size: [u64; 3] },
+    #[error("{} has {} × {} × {} samples along x, y and z, but at least 2 along each are needed, and at most {most}",
+        path.display(), size[0], size[1], size[2])]
+    Size { path: PathBuf, size: [u64; 3], most: u32 },
 
     #[error("{} has {} × {} × {} samples along x, y and z, but --shape says {},{},{}",
         path.display(), found[0], found[1], found[2], said[0], said[1], said[2])]
@@ -51,12 +52,19 @@ pub(crate) enum Error {
     #[error("{} holds samples of type {found}, but --type says {said}", path.display())]
     TypeDisagrees { path: PathBuf, found: SampleType, said: SampleType },
 
-    #[error("{} cannot have {} × {} × {} samples of type {sample_type}, which are more bytes than any file can hold", path.display(), size[0], size[1], size[2])]
-    TooLarge { path: PathBuf, size: [u32; 3], sample_type: SampleType },
+    #[error("{} holds {found}-endian samples, but --endian says {said}", path.display())]
+    EndianDisagrees { path: PathBuf, found: Endian, said: Endian },
 
-    #[error("{} should be {expected} bytes long ({header} of header and {} × {} × {} samples of type {sample_type}), but has {found}",
+    #[error("{} has {found} bytes before the samples, but --skip says {said}", path.display())]
+    SkipDisagrees { path: PathBuf, found: u64, said: u64 },
+
+    #[error("{} cannot be read: {before} and {} × {} × {} samples of type {sample_type} are more bytes than any file can hold",
         path.display(), size[0], size[1], size[2])]
-    Length { path: PathBuf, expected: u64, header: u64, size: [u32; 3], sample_type: SampleType, found: u64 },
+    TooLarge { path: PathBuf, before: Before, size: [u32; 3], sample_type: SampleType },
+
+    #[error("{} should be {expected} bytes long ({before} and {} × {} × {} samples of type {sample_type}), but has {found}",
+        path.display(), size[0], size[1], size[2])]
+    Length { path: PathBuf, expected: u64, before: Before, size: [u32; 3], sample_type: SampleType, found: u64 },
 
     #[error("a slab of {} × {} samples does not fit in memory", slab[0], slab[1])]
     Memory { slab: [u32; 2] },
@@ -65,6 +73,11 @@ pub(crate) enum Error {
         "a spacing of {spacing:?} along an axis of {samples} samples gives positions that 32-bit numbers cannot tell apart or hold"
     )]
     Spacing { spacing: f64, samples: u32 },
+
+    #[error(
+        "an origin of {origin:?} along an axis of {samples} samples gives positions that 32-bit numbers cannot hold"
+    )]
+    Origin { origin: f64, samples: u32 },
 
     #[error("{} cannot be meshed: {source}", path.display())]
     Mesh { path: PathBuf, source: MeshError },
@@ -91,6 +104,32 @@ pub(crate) enum Error {
 
     #[error("interrupted; nothing has been written")]
     Interrupted,
+}
+
+/// How many bytes come before the samples, and who says so.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Before {
+    /// The file itself.
+    Header(u64),
+    /// The command line.
+    Skip(u64),
+}
+
+impl Before {
+    pub(crate) const fn bytes(self) -> u64 {
+        match self {
+            Self::Header(bytes) | Self::Skip(bytes) => bytes,
+        }
+    }
+}
+
+impl fmt::Display for Before {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Header(bytes) => write!(f, "{bytes} bytes of header"),
+            Self::Skip(bytes) => write!(f, "{bytes} bytes to --skip"),
+        }
+    }
 }
 
 impl Error {

@@ -1,13 +1,13 @@
 //! [`Volume`]: a file of samples that is read a slab at a time.
 
 use std::fs::{self, File};
-use std::io::{self, Read as _};
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::PathBuf;
 
 use crate::args::{Args, extension};
-use crate::error::Error;
+use crate::error::{Before, Error};
 use crate::npy::{Header, NpyError};
-use crate::sample::SampleType;
+use crate::sample::{Endian, SampleType};
 
 /// A file of samples, opened where they begin.
 ///
@@ -17,6 +17,8 @@ pub(crate) struct Volume {
     path: PathBuf,
     file: File,
     pub(crate) sample_type: SampleType,
+    /// The order of a sample's bytes.
+    endian: Endian,
     /// Samples along x, y and z; at least 2 each.
     pub(crate) size: [u32; 3],
     /// Whether neighbours along z, rather than x, are neighbours in the file. Then a slab is one of x.
@@ -43,19 +45,25 @@ impl Volume {
             return Err(Error::InputNotAFile { path: path() });
         }
         let file = File::open(&args.input).map_err(read)?;
-        let mut volume = Self { path: path(), file, sample_type: SampleType::U8, size: [0; 3], z_fastest: false };
-        let header = if extension == "npy" { volume.read_header(args)? } else { volume.believe(args)? };
+        let (sample_type, endian) = (SampleType::U8, Endian::Little);
+        let mut volume = Self { path: path(), file, sample_type, endian, size: [0; 3], z_fastest: false };
+        let before = if extension == "npy" { volume.read_header(args)? } else { volume.believe(args)? };
 
         let (size, sample_type) = (volume.size, volume.sample_type);
+        let most = u32::MAX - 2 * args.margin();
+        if size.iter().any(|&samples| samples > most) {
+            return Err(Error::Size { path: path(), size: size.map(u64::from), most });
+        }
         let expected = size
             .iter()
             .try_fold(sample_type.bytes() as u64, |bytes, &samples| bytes.checked_mul(u64::from(samples)))
-            .and_then(|bytes| bytes.checked_add(header))
-            .ok_or_else(|| Error::TooLarge { path: path(), size, sample_type })?;
+            .and_then(|bytes| bytes.checked_add(before.bytes()))
+            .ok_or_else(|| Error::TooLarge { path: path(), before, size, sample_type })?;
         let found = volume.file.metadata().map_err(read)?.len();
         if found != expected {
-            return Err(Error::Length { path: path(), expected, header, size, sample_type, found });
+            return Err(Error::Length { path: path(), expected, before, size, sample_type, found });
         }
+        volume.file.seek(SeekFrom::Start(before.bytes())).map_err(read)?;
         Ok(volume)
     }
 
@@ -76,7 +84,7 @@ impl Volume {
         self.lattice()[2]
     }
 
-    /// Reads the next slab, which fills `bytes`.
+    /// Reads the next slab, which fills `bytes` with little-endian samples.
     ///
     /// # Errors
     /// [`Error::Read`], also where the file has become shorter.
@@ -86,26 +94,32 @@ impl Volume {
                 self.cannot_be_read(io::Error::other("it has become shorter while it was read"))
             }
             _ => self.cannot_be_read(source),
-        })
-    }
-
-    pub(crate) fn error(&self, source: marchless::MeshError) -> Error {
-        Error::Mesh { path: self.path.clone(), source }
+        })?;
+        if self.endian == Endian::Big {
+            match self.sample_type.bytes() {
+                2 => reverse_each::<2>(bytes),
+                4 => reverse_each::<4>(bytes),
+                8 => reverse_each::<8>(bytes),
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     fn cannot_be_read(&self, source: io::Error) -> Error {
         Error::Read { path: self.path.clone(), source }
     }
 
-    /// Takes over what the flags say; returns how long the header is: not at all.
-    fn believe(&mut self, args: &Args) -> Result<u64, Error> {
+    /// Takes over what the flags say; returns what comes before the samples.
+    fn believe(&mut self, args: &Args) -> Result<Before, Error> {
         self.size = args.shape.ok_or(Error::FlagMissing { flag: "--shape" })?;
         self.sample_type = args.sample_type.ok_or(Error::FlagMissing { flag: "--type" })?;
-        Ok(0)
+        self.endian = args.endian.unwrap_or(Endian::Little);
+        Ok(Before::Skip(args.skip.unwrap_or(0)))
     }
 
-    /// Takes over what the header says; returns how long it is.
-    fn read_header(&mut self, args: &Args) -> Result<u64, Error> {
+    /// Takes over what the header says; returns what comes before the samples.
+    fn read_header(&mut self, args: &Args) -> Result<Before, Error> {
         let path = || args.input.clone();
         let header = Header::read(&mut self.file).map_err(|error| match error {
             NpyError::Io(source) => self.cannot_be_read(source),
@@ -114,7 +128,7 @@ impl Volume {
         let [z, y, x] = header.shape;
         let size = [x, y, z].map(|samples| u32::try_from(samples).ok().filter(|&samples| samples >= 2));
         let [Some(x), Some(y), Some(z)] = size else {
-            return Err(Error::Size { path: path(), size: [x, y, z] });
+            return Err(Error::Size { path: path(), size: [x, y, z], most: u32::MAX });
         };
         let found = [x, y, z];
         if let Some(said) = args.shape.filter(|&said| said != found) {
@@ -123,7 +137,21 @@ impl Volume {
         if let Some(said) = args.sample_type.filter(|&said| said != header.sample_type) {
             return Err(Error::TypeDisagrees { path: path(), found: header.sample_type, said });
         }
+        if let (Some(found), Some(said)) = (header.endian, args.endian)
+            && found != said
+        {
+            return Err(Error::EndianDisagrees { path: path(), found, said });
+        }
+        if let Some(said) = args.skip.filter(|&said| said != header.length) {
+            return Err(Error::SkipDisagrees { path: path(), found: header.length, said });
+        }
         (self.size, self.sample_type, self.z_fastest) = (found, header.sample_type, header.fortran_order);
-        Ok(header.length)
+        self.endian = header.endian.unwrap_or(Endian::Little);
+        Ok(Before::Header(header.length))
     }
+}
+
+/// Turns the order of the bytes in each sample of `N` bytes round.
+fn reverse_each<const N: usize>(bytes: &mut [u8]) {
+    bytes.as_chunks_mut::<N>().0.iter_mut().for_each(|sample| sample.reverse());
 }

@@ -4,14 +4,25 @@
 //! mesh_volume head.npy --iso 300 -o head.ply
 //! mesh_volume engine.raw --shape 256,256,128 --type u8 --iso 80 --spacing 1,1,1.6 -o engine.glb
 //! mesh_volume caves.npy --chunk 64 --check -o caves.ply
+//! mesh_volume mask.npy --iso 0.5 --invert --close -o part.stl
+//! mesh_volume scan.raw --shape 512,512,300 --type i16 --endian big --skip 1024 --origin -20,0,35.5 -o scan.ply
 //! ```
 //!
-//! What lies below the isovalue is inside. The volume may be larger than memory: it is read, meshed and written a slab
+//! What lies below the isovalue is inside. In a volume of `bool`, false is 0 and true is 1: `--iso 0.5` lies between
+//! them, and with `--invert` the mesh is that of what is true. Samples of up to 16 bits are exact. Of larger ones, the
+//! difference to the isovalue is rounded to an `f32` (24 bits), though never across zero; so the surface always lies
+//! between the right samples.
+//!
+//! Where the surface leaves the volume, it is open; `--close` closes it, half a sample beyond the outermost samples.
+//! `--origin` is the position of the first sample. Positions are `f32`: far from 0, they are rounded.
+//!
+//! The volume may be larger than memory: it is read, meshed and written a slab
 //! (the samples of one z) at a time. With `--chunk`, the meshes of one layer of chunks are held until it is complete;
 //! with `--check` alone, the whole mesh is, though never the volume. (So the mesh is judged by itself, as any reader
 //! would find it, not against its samples.)
 
 mod args;
+mod close;
 mod error;
 mod input;
 mod npy;
@@ -34,6 +45,7 @@ use clap::Parser as _;
 use args::Args;
 use error::Error;
 use input::Volume;
+use sample::SampleType;
 use sink::{ChunkedSink, Made, Sink, WholeSink};
 use split::Chunks;
 use stream::{Times, stream};
@@ -53,7 +65,7 @@ fn run(args: &Args) -> Result<(), Error> {
     args.check_files()?;
     let mut volume = Volume::open(args)?;
     let transform = Transform::new(args, &volume)?;
-    let chunks = args.chunk.map(|size| Chunks::new(size, &volume)).transpose()?;
+    let chunks = args.chunk.map(|size| Chunks::new(size, args.margin(), &volume)).transpose()?;
     let stop = Stop::on_signals();
     let sink: Box<dyn Sink> = match chunks {
         Some(chunks) => Box::new(ChunkedSink::new(args, chunks, transform)?),
@@ -76,8 +88,12 @@ fn run(args: &Args) -> Result<(), Error> {
         note(format_args!("no chunk of this mesh, and so left as it was: {}{more}", first.display()));
     }
     if is_empty {
+        let hint = match volume.sample_type {
+            SampleType::Bool => " (false is 0 and true is 1: --iso 0.5 lies between them)",
+            _ => "",
+        };
         note(format_args!(
-            "there is no surface, since no neighbouring samples lie on different sides of {:?}",
+            "there is no surface, since no neighbouring samples lie on different sides of {:?}{hint}",
             args.iso
         ));
     }

@@ -9,7 +9,7 @@ use std::io::{self, Read};
 
 use thiserror::Error;
 
-use crate::sample::SampleType;
+use crate::sample::{Endian, SampleType};
 
 const MAGIC: [u8; 6] = *b"\x93NUMPY";
 
@@ -20,6 +20,8 @@ const MAX_TEXT: u64 = 1 << 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     pub(crate) sample_type: SampleType,
+    /// The order of a sample's bytes, where it has several.
+    pub(crate) endian: Option<Endian>,
     /// The lengths of the array's three axes, in the order of their indices.
     pub(crate) shape: [u64; 3],
     /// Whether neighbours along the first axis, rather than the last, are neighbours in the file.
@@ -74,12 +76,10 @@ pub(crate) enum NpyError {
     Syntax { expected: &'static str, at: usize, found: String },
     #[error("its .npy header has no '{key}'")]
     Missing { key: &'static str },
-    #[error("its samples are of NumPy's type {found}, but only i1, u1, i2, u2, i4, f4 and f8 can be meshed")]
-    Type { found: String },
     #[error(
-        "its samples are big-endian ({found}), but must be little-endian; NumPy's astype('{wanted}') makes them so"
+        "its samples are of NumPy's type {found}, but only b1, i1, u1, i2, u2, i4, u4, i8, u8, f4 and f8 can be meshed"
     )]
-    BigEndian { found: String, wanted: String },
+    Type { found: String },
     #[error("its array has {found} axes, but a volume has 3: z, y and x")]
     Axes { found: usize },
 }
@@ -122,8 +122,10 @@ impl Parser<'_> {
             return Err(self.error("nothing but spaces"));
         }
         let lengths = shape.ok_or(NpyError::Missing { key: "shape" })?;
+        let (sample_type, endian) = sample_type.ok_or(NpyError::Missing { key: "descr" })?;
         Ok(Header {
-            sample_type: sample_type.ok_or(NpyError::Missing { key: "descr" })?,
+            sample_type,
+            endian,
             shape: lengths.try_into().map_err(|lengths: Vec<u64>| NpyError::Axes { found: lengths.len() })?,
             fortran_order: fortran_order.ok_or(NpyError::Missing { key: "fortran_order" })?,
             length,
@@ -131,29 +133,36 @@ impl Parser<'_> {
     }
 
     /// A type as NumPy writes it: byte order, kind, bytes.
-    fn sample_type(&mut self) -> Result<SampleType, NpyError> {
+    fn sample_type(&mut self) -> Result<(SampleType, Option<Endian>), NpyError> {
         if self.peek() == Some(b'[') {
             return Err(NpyError::Type { found: "[…] (a record)".to_owned() });
         }
         let found = self.string("a type")?;
         let Some((order, kind)) = found.split_at_checked(1) else { return Err(NpyError::Type { found }) };
         let sample_type = match kind {
+            "b1" => SampleType::Bool,
             "i1" => SampleType::I8,
             "u1" => SampleType::U8,
             "i2" => SampleType::I16,
             "u2" => SampleType::U16,
             "i4" => SampleType::I32,
+            "u4" => SampleType::U32,
+            "i8" => SampleType::I64,
+            "u8" => SampleType::U64,
             "f4" => SampleType::F32,
             "f8" => SampleType::F64,
             _ => return Err(NpyError::Type { found }),
         };
-        match order {
-            "<" => Ok(sample_type),
+        let endian = match order {
             // A single byte has no order.
-            "|" | ">" if sample_type.bytes() == 1 => Ok(sample_type),
-            ">" => Err(NpyError::BigEndian { wanted: format!("<{kind}"), found }),
-            _ => Err(NpyError::Type { found }),
-        }
+            "|" | "<" | ">" | "=" if sample_type.bytes() == 1 => None,
+            "<" => Some(Endian::Little),
+            ">" => Some(Endian::Big),
+            // The reader's own, as NumPy has it.
+            "=" => Some(Endian::NATIVE),
+            _ => return Err(NpyError::Type { found }),
+        };
+        Ok((sample_type, endian))
     }
 
     fn truth(&mut self) -> Result<bool, NpyError> {

@@ -1,4 +1,7 @@
 //! [`Sample`]: how the samples of a file become weights, with the isovalue moved along and no sample changing sides.
+//!
+//! The mesher computes with integers of up to 16 bits and with `f32`. So samples of up to 16 bits stay exactly what they
+//! are. Of all others, the difference to the isovalue becomes an `f32`; what is rounded is that difference, to 24 bits.
 
 use std::fmt;
 
@@ -8,11 +11,16 @@ use marchless::Weight;
 /// The type of the samples in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SampleType {
+    /// A byte: 0 is false and counts as 0, any other is true and counts as 1.
+    Bool,
     I8,
     U8,
     I16,
     U16,
     I32,
+    U32,
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -20,10 +28,10 @@ pub(crate) enum SampleType {
 impl SampleType {
     pub(crate) const fn bytes(self) -> usize {
         match self {
-            Self::I8 | Self::U8 => 1,
+            Self::Bool | Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::F32 => 4,
-            Self::F64 => 8,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
 }
@@ -31,13 +39,38 @@ impl SampleType {
 impl fmt::Display for SampleType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Bool => "bool",
             Self::I8 => "i8",
             Self::U8 => "u8",
             Self::I16 => "i16",
             Self::U16 => "u16",
             Self::I32 => "i32",
+            Self::U32 => "u32",
+            Self::I64 => "i64",
+            Self::U64 => "u64",
             Self::F32 => "f32",
             Self::F64 => "f64",
+        })
+    }
+}
+
+/// The order of a sample's bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Endian {
+    Little,
+    Big,
+}
+
+impl Endian {
+    /// This machine's order.
+    pub(crate) const NATIVE: Self = if cfg!(target_endian = "big") { Self::Big } else { Self::Little };
+}
+
+impl fmt::Display for Endian {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Little => "little",
+            Self::Big => "big",
         })
     }
 }
@@ -79,6 +112,18 @@ integer_sample!(i16, i16, 0);
 integer_sample!(u8, i8, 0x80);
 integer_sample!(u16, i16, 0x8000);
 
+impl Sample for bool {
+    type Weight = i8;
+
+    fn isovalue(iso: f64) -> f32 {
+        i8::isovalue(iso)
+    }
+
+    fn decode(bytes: &[u8], _iso: f64, weights: &mut Vec<i8>) {
+        weights.extend(bytes.iter().map(|&byte| i8::from(byte != 0)));
+    }
+}
+
 /// The isovalue of integer weights, in voxels, for samples from `least` to `most`, the lowest of which becomes the
 /// lowest weight.
 ///
@@ -115,16 +160,50 @@ macro_rules! real_sample {
 
 // An `i32` has more digits than an `f32`, but what is left of it near the isovalue has few.
 real_sample!(i32);
+real_sample!(u32);
 real_sample!(f32);
 real_sample!(f64);
 
+macro_rules! long_sample {
+    ($type:ty) => {
+        impl Sample for $type {
+            type Weight = f32;
+
+            fn isovalue(_iso: f64) -> f32 {
+                0.0
+            }
+
+            fn decode(bytes: &[u8], iso: f64, weights: &mut Vec<f32>) {
+                let (samples, _) = bytes.as_chunks();
+                weights.extend(samples.iter().map(|&sample| above_long(<$type>::from_le_bytes(sample).into(), iso)));
+            }
+        }
+    };
+}
+
+// Beyond 2^53, an `f64` does not hold them all.
+long_sample!(i64);
+long_sample!(u64);
+
 /// How far the sample lies above the isovalue, rounded such that it is negative exactly where the sample lies below.
-/// (Differences that are too small for an `f32` become zero, or its smallest number below.)
 #[inline(always)]
 fn above(sample: f64, iso: f64) -> f32 {
-    const LEAST: f32 = f32::from_bits(1);
     // Never zero for different numbers.
-    let difference = sample - iso;
+    rounded(sample - iso)
+}
+
+/// The same for an integer of up to 64 bits.
+fn above_long(sample: i128, iso: f64) -> f32 {
+    let whole = iso.floor();
+    // No sample comes near the limits, within which differences are exact.
+    let steps = sample - whole.clamp(-1e30, 1e30) as i128;
+    rounded(steps as f64 - (iso - whole))
+}
+
+/// The difference as an `f32` of the same sign; one that is too small becomes zero, or the smallest number below.
+#[inline(always)]
+fn rounded(difference: f64) -> f32 {
+    const LEAST: f32 = f32::from_bits(1);
     let rounded = difference as f32;
     if difference < 0.0 { rounded.min(-LEAST) } else { rounded }
 }

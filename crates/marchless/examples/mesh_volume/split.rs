@@ -18,12 +18,16 @@ use crate::recent::Recent;
 const MOST: u64 = 1_000_000;
 
 /// Which cells belong to which chunk. Cells and chunks are counted along the axes of the file, the fastest first.
+///
+/// Cells of a margin around the volume belong to the chunks next to them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chunks {
     /// Cells of the volume per axis; at least 1.
     cells: [u32; 3],
     /// Cells of a chunk per axis, at most.
     size: u32,
+    /// Layers of samples around the volume.
+    margin: u32,
     /// How many chunks there are; at most [`MOST`].
     pub(crate) count: u64,
     /// How far the numbers of neighbours are apart: x fastest, whatever the order of the file.
@@ -33,7 +37,7 @@ pub(crate) struct Chunks {
 impl Chunks {
     /// # Errors
     /// [`Error::TooManyChunks`].
-    pub(crate) fn new(size: NonZeroU32, volume: &Volume) -> Result<Self, Error> {
+    pub(crate) fn new(size: NonZeroU32, margin: u32, volume: &Volume) -> Result<Self, Error> {
         let size = size.get();
         let cells = volume.lattice().map(|samples| samples - 1);
         let count =
@@ -48,7 +52,7 @@ impl Chunks {
         }
         let [a, b, c] = cells.map(|cells| u64::from(cells.div_ceil(size)));
         let strides = if volume.z_fastest { [c * b, c, 1] } else { [1, a, a * b] };
-        Ok(Self { cells, size, count: chunks as u64, strides })
+        Ok(Self { cells, size, margin, count: chunks as u64, strides })
     }
 
     /// The number of the chunk at these positions, of which the first is 0.
@@ -56,10 +60,24 @@ impl Chunks {
         (0..3).map(|axis| u64::from(chunk[axis]) * self.strides[axis]).sum()
     }
 
-    /// The first and the last samples of a chunk, which it shares with its neighbours.
+    /// Which chunk along `axis` has the mesher's cells at `cell`.
+    fn at(&self, axis: usize, cell: u32) -> u32 {
+        cell.saturating_sub(self.margin).min(self.cells[axis] - 1) / self.size
+    }
+
+    /// The mesher's cells along `axis`.
+    fn with_margin(&self, axis: usize) -> u32 {
+        self.cells[axis] + 2 * self.margin
+    }
+
+    /// The first and the last of a chunk's samples, which it shares with its neighbours, by the mesher's count.
     fn samples(&self, chunk: [u32; 3]) -> [[u32; 3]; 2] {
-        let first = chunk.map(|v| v * self.size);
-        [first, [0, 1, 2].map(|axis| first[axis].saturating_add(self.size).min(self.cells[axis]))]
+        let first = [0, 1, 2].map(|axis| if chunk[axis] == 0 { 0 } else { chunk[axis] * self.size + self.margin });
+        let last = [0, 1, 2].map(|axis| {
+            let last = u64::from(chunk[axis] + 1) * u64::from(self.size);
+            if last < u64::from(self.cells[axis]) { last as u32 + self.margin } else { self.with_margin(axis) }
+        });
+        [first, last]
     }
 }
 
@@ -84,9 +102,9 @@ struct Vertex {
 /// A chunk with a surface, all of it.
 pub(crate) struct Chunk {
     pub(crate) number: u64,
-    /// Its first and its last samples.
+    /// Its first and its last samples, by the mesher's count.
     pub(crate) samples: [[u32; 3]; 2],
-    /// As the whole mesh has it: in grid units from the volume's first sample.
+    /// As the whole mesh has it: in grid units from the mesher's first sample.
     pub(crate) mesh: MeshBuffer,
 }
 
@@ -105,6 +123,7 @@ impl Split {
         let vertices = vertices.map(|(&position, &normal)| Vertex { position, normal, last: None });
         self.recent.extend(vertices).map_err(|_| Error::MeshMemory)?;
         let Some(z) = slab.checked_sub(1) else { return Ok(Vec::new()) };
+        let layer = self.chunks.at(2, z);
 
         let size = self.chunks.size;
         let [width, depth, _] = self.chunks.cells.map(|cells| cells.div_ceil(size) as usize);
@@ -114,11 +133,8 @@ impl Split {
             let [Some(a), Some(b), Some(c)] = corners else { return Err(Error::VertexMissing) };
             // No triangle lies within a face of its cell. (Beyond 16,384 samples, rounding can bring one there; then
             // it counts to the far side, if there is any.)
-            let [x, y] = [0, 1].map(|axis| {
-                let cell = a[axis].min(b[axis]).min(c[axis]) as u32;
-                cell.min(self.chunks.cells[axis] - 1) / size
-            });
-            let number = self.chunks.number([x, y, z / size]);
+            let [x, y] = [0, 1].map(|axis| self.chunks.at(axis, a[axis].min(b[axis]).min(c[axis]) as u32));
+            let number = self.chunks.number([x, y, layer]);
             let slot = self.layer.get_mut(x as usize + width * y as usize).ok_or(Error::VertexMissing)?;
             let mesh = slot.get_or_insert_default();
             mesh.indices.try_reserve(3).map_err(|_| Error::MeshMemory)?;
@@ -128,12 +144,12 @@ impl Split {
                 mesh.indices.push(name);
             }
         }
-        if !slab.is_multiple_of(size) && slab < self.chunks.cells[2] {
+        if slab < self.chunks.with_margin(2) && self.chunks.at(2, slab) == layer {
             return Ok(Vec::new());
         }
         self.names.clear();
         let parts = self.layer.drain(..).enumerate().filter_map(|(place, mesh)| {
-            let chunk = [(place % width) as u32, (place / width) as u32, z / size];
+            let chunk = [(place % width) as u32, (place / width) as u32, layer];
             let (number, samples) = (self.chunks.number(chunk), self.chunks.samples(chunk));
             Some(Chunk { number, samples, mesh: *mesh? })
         });

@@ -3,10 +3,11 @@
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use marchless::{MeshBuffer, MeshSettings, SlabMesher, Topology};
+use marchless::{MeshBuffer, MeshError, MeshSettings, SlabMesher, Topology, Weight};
 
 use crate::Stop;
 use crate::args::Args;
+use crate::close::Closed;
 use crate::error::Error;
 use crate::input::Volume;
 use crate::sample::{Sample, SampleType};
@@ -33,11 +34,15 @@ pub(crate) fn stream(
     stop: &Stop,
 ) -> Result<(Made, Times), Error> {
     let run = match volume.sample_type {
+        SampleType::Bool => stream_as::<bool>,
         SampleType::I8 => stream_as::<i8>,
         SampleType::U8 => stream_as::<u8>,
         SampleType::I16 => stream_as::<i16>,
         SampleType::U16 => stream_as::<u16>,
         SampleType::I32 => stream_as::<i32>,
+        SampleType::U32 => stream_as::<u32>,
+        SampleType::I64 => stream_as::<i64>,
+        SampleType::U64 => stream_as::<u64>,
         SampleType::F32 => stream_as::<f32>,
         SampleType::F64 => stream_as::<f64>,
     };
@@ -47,39 +52,107 @@ pub(crate) fn stream(
 fn stream_as<S: Sample>(
     volume: &mut Volume,
     args: &Args,
-    mut sink: Box<dyn Sink>,
+    sink: Box<dyn Sink>,
     stop: &Stop,
 ) -> Result<(Made, Times), Error> {
-    let slab = volume.slab();
-    let (mut bytes, mut weights) = buffers::<S>(slab, volume.sample_type)?;
-    let topology = if args.exact { Topology::Trilinear } else { Topology::Separated };
-    let settings = MeshSettings { isovalue: S::isovalue(args.iso), topology, ..MeshSettings::default() };
-    let mut mesher = SlabMesher::new(slab, settings).map_err(|source| volume.error(source))?;
-    let mut mesh = MeshBuffer::new();
-    let (mut times, mut since) = (Times::default(), Instant::now());
+    let (slab, slabs) = (volume.slab(), volume.slabs());
+    let isovalue = S::isovalue(args.iso);
+    if !args.close {
+        let mut meshing = Meshing::new(slab, slabs.into(), isovalue, args, sink, stop)?;
+        for_each_slab::<S>(volume, args.iso, |_, weights| meshing.push(weights))?;
+        return meshing.finish();
+    }
+    let mut closed = Closed::new(slab, isovalue, args.invert)?;
+    let mut meshing = Meshing::new(closed.size(), u64::from(slabs) + 2, 0.0, args, sink, stop)?;
+    for_each_slab::<S>(volume, args.iso, |z, weights| {
+        if z == 0 {
+            meshing.push(closed.beyond(weights))?;
+        }
+        meshing.push(closed.within(weights))?;
+        if z == slabs - 1 {
+            meshing.push(closed.beyond(weights))?;
+        }
+        Ok(())
+    })?;
+    meshing.finish()
+}
 
-    let progress = progress_bar(volume.slabs());
+/// Calls `take` with the number and the weights of each slab.
+fn for_each_slab<S: Sample>(
+    volume: &mut Volume,
+    iso: f64,
+    mut take: impl FnMut(u32, &[S::Weight]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let (mut bytes, mut weights) = buffers::<S>(volume.slab(), volume.sample_type)?;
     for slab in 0..volume.slabs() {
         volume.read(&mut bytes)?;
         weights.clear();
-        S::decode(&bytes, args.iso, &mut weights);
-        spend(&mut since, &mut times.reading);
-        mesher.push(&weights, &mut mesh).map_err(|source| volume.error(source))?;
-        spend(&mut since, &mut times.meshing);
-        // The mesher waits for the next slab before it makes anything of one.
-        if let Some(made) = slab.checked_sub(1) {
-            sink.take(made, &mut mesh, stop)?;
-        }
-        spend(&mut since, &mut times.writing);
-        progress.inc(1);
+        S::decode(&bytes, iso, &mut weights);
+        take(slab, &weights)?;
     }
-    mesher.finish(&mut mesh).map_err(|source| volume.error(source))?;
-    spend(&mut since, &mut times.meshing);
-    sink.take(volume.slabs() - 1, &mut mesh, stop)?;
-    let made = sink.finish(stop)?;
-    spend(&mut since, &mut times.writing);
-    progress.finish_and_clear();
-    Ok((made, times))
+    Ok(())
+}
+
+/// A mesher on its way from the first slab to the last.
+struct Meshing<'a, W> {
+    args: &'a Args,
+    stop: &'a Stop,
+    sink: Box<dyn Sink>,
+    mesher: SlabMesher<W>,
+    mesh: MeshBuffer,
+    /// The slab that comes next.
+    next: u32,
+    times: Times,
+    since: Instant,
+    progress: ProgressBar,
+}
+
+impl<'a, W: Weight> Meshing<'a, W> {
+    fn new(
+        slab: [u32; 2],
+        slabs: u64,
+        isovalue: f32,
+        args: &'a Args,
+        sink: Box<dyn Sink>,
+        stop: &'a Stop,
+    ) -> Result<Self, Error> {
+        let topology = if args.exact { Topology::Trilinear } else { Topology::Separated };
+        let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
+        let mesher = SlabMesher::new(slab, settings).map_err(|source| error(args, source))?;
+        let (mesh, progress) = (MeshBuffer::new(), progress_bar(slabs));
+        let (times, since) = (Times::default(), Instant::now());
+        Ok(Self { args, stop, sink, mesher, mesh, next: 0, times, since, progress })
+    }
+
+    /// Meshes one slab more.
+    fn push(&mut self, weights: &[W]) -> Result<(), Error> {
+        spend(&mut self.since, &mut self.times.reading);
+        self.mesher.push(weights, &mut self.mesh).map_err(|source| error(self.args, source))?;
+        spend(&mut self.since, &mut self.times.meshing);
+        // The mesher waits for the next slab before it makes anything of one.
+        if let Some(made) = self.next.checked_sub(1) {
+            self.sink.take(made, &mut self.mesh, self.stop)?;
+        }
+        self.next += 1;
+        spend(&mut self.since, &mut self.times.writing);
+        self.progress.inc(1);
+        Ok(())
+    }
+
+    /// Completes the mesh.
+    fn finish(mut self) -> Result<(Made, Times), Error> {
+        self.mesher.finish(&mut self.mesh).map_err(|source| error(self.args, source))?;
+        spend(&mut self.since, &mut self.times.meshing);
+        self.sink.take(self.next - 1, &mut self.mesh, self.stop)?;
+        let made = self.sink.finish(self.stop)?;
+        spend(&mut self.since, &mut self.times.writing);
+        self.progress.finish_and_clear();
+        Ok((made, self.times))
+    }
+}
+
+fn error(args: &Args, source: MeshError) -> Error {
+    Error::Mesh { path: args.input.clone(), source }
 }
 
 /// Counts the time that has passed since the last call as `part`.
@@ -102,7 +175,7 @@ fn buffers<S: Sample>([a, b]: [u32; 2], sample_type: SampleType) -> Result<(Vec<
 }
 
 /// Shown while standard error is a terminal.
-fn progress_bar(slabs: u32) -> ProgressBar {
+fn progress_bar(slabs: u64) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} to go");
-    ProgressBar::new(u64::from(slabs)).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    ProgressBar::new(slabs).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

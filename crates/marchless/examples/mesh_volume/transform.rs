@@ -6,7 +6,8 @@ use crate::args::Args;
 use crate::error::Error;
 use crate::input::Volume;
 
-/// From the lattice of the file, in the order of its memory, to positions in grid units times spacing.
+/// From the mesher's lattice, in the order of the file's memory, to positions: the sample's number times the spacing,
+/// from the origin on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Transform {
     /// Whether the file's fastest axis is z.
@@ -14,21 +15,30 @@ pub(crate) struct Transform {
     /// Whether normals point to smaller values.
     invert: bool,
     spacing: [f64; 3],
+    /// The first sample's position.
+    origin: [f64; 3],
+    /// Layers of samples around the volume.
+    margin: f64,
 }
 
 impl Transform {
     /// # Errors
     /// [`Error::Spacing`] where the far end of the volume lies beyond 32-bit numbers, or steps within a cell below
-    /// them.
+    /// them; [`Error::Origin`] where an end of it does as far from the origin.
     pub(crate) fn new(args: &Args, volume: &Volume) -> Result<Self, Error> {
-        for (&spacing, &samples) in args.spacing.iter().zip(&volume.size) {
+        for axis in 0..3 {
+            let (spacing, origin, samples) = (args.spacing[axis], args.origin[axis], volume.size[axis]);
             let far = f64::from(samples) * spacing;
             // Crossings stay 1/1024 of an edge apart.
             if far > f64::from(f32::MAX) || spacing / 1024.0 < f64::from(f32::MIN_POSITIVE) {
                 return Err(Error::Spacing { spacing, samples });
             }
+            if [origin - spacing, origin + far].iter().any(|end| end.abs() > f64::from(f32::MAX)) {
+                return Err(Error::Origin { origin, samples });
+            }
         }
-        Ok(Self { z_fastest: volume.z_fastest, invert: args.invert, spacing: args.spacing })
+        let (spacing, origin, margin) = (args.spacing, args.origin, f64::from(args.margin()));
+        Ok(Self { z_fastest: volume.z_fastest, invert: args.invert, spacing, origin, margin })
     }
 
     /// Moves a piece of the mesh.
@@ -47,14 +57,17 @@ impl Transform {
         }
     }
 
-    /// Where samples of the file's lattice are; to the last bit the coordinates that vertices beside them have.
+    /// Where samples of the mesher's lattice are; to the last bit the coordinates that vertices beside them have.
     pub(crate) fn corners(&self, samples: [[u32; 3]; 2]) -> [[f32; 3]; 2] {
         samples.map(|sample| self.position(sample.map(|v| v as f32)))
     }
 
     fn position(&self, lattice: [f32; 3]) -> [f32; 3] {
         let lattice = self.ordered(lattice);
-        [0, 1, 2].map(|axis| (f64::from(lattice[axis]) * self.spacing[axis]) as f32)
+        [0, 1, 2].map(|axis| {
+            let sample = f64::from(lattice[axis]) - self.margin;
+            (sample * self.spacing[axis] + self.origin[axis]) as f32
+        })
     }
 
     /// The vector in the order x, y, z.

@@ -22,13 +22,14 @@ fn triangles(mesh: &Mesh) -> Vec<[Vertex; 3]> {
 }
 
 /// The whole mesh's triangles by the chunk that their middle lies in, the numbers of which run x fastest.
+/// What lies outside of the volume belongs to the nearest chunk.
 fn by_chunk(whole: &Mesh, size: [usize; 3], cells: usize, spacing: [f64; 3]) -> BTreeMap<usize, Vec<[Vertex; 3]>> {
     let counts = size.map(|samples| (samples - 1).div_ceil(cells));
     let mut chunks: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (corners, triangle) in whole.corners().iter().zip(triangles(whole)) {
         let [x, y, z] = [0, 1, 2].map(|axis| {
             let sum: f64 = corners.iter().map(|corner| f64::from(corner[axis])).sum();
-            (sum / 3.0 / spacing[axis]) as usize / cells
+            ((sum / 3.0 / spacing[axis]) as usize).min(size[axis] - 2) / cells
         });
         chunks.entry(x + counts[0] * (y + counts[1] * z)).or_default().push(triangle);
     }
@@ -46,20 +47,32 @@ fn read_chunks(folder: &Folder) -> BTreeMap<usize, Mesh> {
     chunks.collect()
 }
 
-/// The corners of the box around a chunk.
-fn bounds(number: usize, size: [usize; 3], cells: usize, spacing: [f64; 3]) -> [[f32; 3]; 2] {
+/// The corners of the box around a chunk; with `close`, chunks at the volume's border reach a sample beyond it.
+fn bounds(number: usize, size: [usize; 3], cells: usize, spacing: [f64; 3], close: bool) -> [[f32; 3]; 2] {
     let [x, y, _] = size.map(|samples| (samples - 1).div_ceil(cells));
     let chunk = [number % x, number / x % y, number / x / y];
     [0, 1].map(|end| {
         [0, 1, 2].map(|axis| {
             let sample = ((chunk[axis] + end) * cells).min(size[axis] - 1);
-            (sample as f64 * spacing[axis]) as f32
+            let margin = match (close, sample) {
+                (true, 0) => -1.0,
+                (true, last) if last == size[axis] - 1 => 1.0,
+                _ => 0.0,
+            };
+            ((sample as f64 + margin) * spacing[axis]) as f32
         })
     })
 }
 
 /// That each chunk is clean, has what the whole mesh has in it, and shares with its neighbours what lies on the border.
-fn assert_chunks(chunks: &BTreeMap<usize, Mesh>, whole: &Mesh, size: [usize; 3], cells: usize, spacing: [f64; 3]) {
+fn assert_chunks(
+    chunks: &BTreeMap<usize, Mesh>,
+    whole: &Mesh,
+    size: [usize; 3],
+    cells: usize,
+    spacing: [f64; 3],
+    close: bool,
+) {
     let expected = by_chunk(whole, size, cells, spacing);
     assert_eq!(chunks.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
     let mut normals = BTreeMap::new();
@@ -67,7 +80,7 @@ fn assert_chunks(chunks: &BTreeMap<usize, Mesh>, whole: &Mesh, size: [usize; 3],
     let mut borders: BTreeMap<(usize, u32), [BTreeSet<Vertex>; 2]> = BTreeMap::new();
     for (&number, mesh) in chunks {
         assert_eq!(triangles(mesh), expected[&number], "chunk {number}");
-        let bounds = bounds(number, size, cells, spacing);
+        let bounds = bounds(number, size, cells, spacing, close);
         let report = MeshReport::in_box(&mesh.positions, &mesh.indices, bounds);
         assert!(report.is_clean(), "chunk {number}: {report}");
         for index in 0..mesh.positions.len() as u32 {
@@ -100,7 +113,7 @@ proptest! {
         amplitude in prop_oneof![Just(0.0), 5.0..200.0],
         cells in 1usize..9,
         spacing in prop_oneof![Just([1.0; 3]), prop::array::uniform3(prop::sample::select(&[0.1, 0.7, 1.0, 3.3][..]))],
-        (fortran, invert, exact) in any::<(bool, bool, bool)>(),
+        (fortran, invert, exact, close) in any::<(bool, bool, bool, bool)>(),
     ) {
         let volume = Volume::new(size, kind, |[x, y, z]| {
             let wave = (x as f64 * 0.9 + seed as f64).sin() + (y as f64 * 1.1).cos() + (z as f64 * 0.8).sin();
@@ -110,7 +123,7 @@ proptest! {
         folder.write("v.npy", &if fortran { volume.npy_fortran() } else { volume.npy(1) });
         let [x, y, z] = spacing;
         let mut args = format!("v.npy --iso 60 --spacing {x},{y},{z} --check");
-        for flag in [(invert, " --invert"), (exact, " --exact")] {
+        for flag in [(invert, " --invert"), (exact, " --exact"), (close, " --close")] {
             args += if flag.0 { flag.1 } else { "" };
         }
         folder.run(&format!("{args} -o whole.ply"));
@@ -119,7 +132,7 @@ proptest! {
         prop_assert!(output.status.success(), "{errors}");
         let whole = readers::ply(&folder.read("whole.ply"));
         let chunks = read_chunks(&folder);
-        assert_chunks(&chunks, &whole, size, cells, spacing);
+        assert_chunks(&chunks, &whole, size, cells, spacing, close);
         let said = String::from_utf8_lossy(&output.stdout);
         prop_assert!(said.starts_with(&format!("meshes checked: {}, all clean\n", chunks.len())), "{said}");
         let count: usize = size.iter().map(|samples| (samples - 1).div_ceil(cells)).product();
@@ -154,7 +167,7 @@ fn chunks_are_the_same_in_every_format() {
         .iter()
         .map(|name| (name.parse().expect("a number"), readers::ply(&folder.read(&format!("o.{name}.ply")))))
         .collect();
-    assert_chunks(&chunks, &readers::ply(&folder.read("whole.ply")), volume.size, 8, [1.0; 3]);
+    assert_chunks(&chunks, &readers::ply(&folder.read("whole.ply")), volume.size, 8, [1.0; 3], false);
     // The chunks at the volume's corners, and those along its edges that the ball does not reach, have no files.
     assert!(ply.len() > 20 && ply.len() < 64 && !ply.contains(&"0000"), "{ply:?}");
     for (name, mesh) in ply.iter().zip(chunks.values()) {
@@ -174,7 +187,7 @@ fn a_chunk_may_be_larger_than_the_volume() {
         folder.mesh(&format!("{args} --iso 100 --chunk {cells} -o o.ply"));
         assert_eq!(folder.names(), ["o.0000.ply", "v.raw", "whole.ply"]);
         let whole = readers::ply(&folder.read("whole.ply"));
-        assert_chunks(&read_chunks(&folder), &whole, volume.size, 32, [1.0; 3]);
+        assert_chunks(&read_chunks(&folder), &whole, volume.size, 32, [1.0; 3], false);
     }
 }
 

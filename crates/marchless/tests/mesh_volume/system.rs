@@ -220,7 +220,7 @@ mod unix {
             assert!(output.status.success(), "{}: {errors}", output.status);
             println!("{}", String::from_utf8_lossy(&output.stdout));
         }
-        for flags in ["--check", "--chunk 64 --check"] {
+        for flags in ["--check", "--chunk 64 --check", "--close --chunk 64 --check"] {
             let args = format!("v.raw --shape {size},{size},{size} --type u8 --iso 128 --invert {flags} -o c.ply");
             let output = limited(&folder, &format!("ulimit -v {}", 1024 * mebibytes), &args);
             let said = String::from_utf8_lossy(&output.stdout);

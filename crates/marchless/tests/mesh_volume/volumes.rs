@@ -1,16 +1,20 @@
 //! Volumes to be meshed: their samples, and the files that hold them.
 
-/// The types of samples, as the example names them.
-pub(crate) const TYPES: [&str; 7] = ["i8", "u8", "i16", "u16", "i32", "f32", "f64"];
+/// The types of samples, as the example names them; but for bool, which has two values only.
+pub(crate) const TYPES: [&str; 10] = ["i8", "u8", "i16", "u16", "i32", "u32", "i64", "u64", "f32", "f64"];
 
 /// NumPy's names for them.
 pub(crate) fn numpy_type(kind: &str) -> &'static str {
     match kind {
+        "bool" => "|b1",
         "i8" => "|i1",
         "u8" => "|u1",
         "i16" => "<i2",
         "u16" => "<u2",
         "i32" => "<i4",
+        "u32" => "<u4",
+        "i64" => "<i8",
+        "u64" => "<u8",
         "f32" => "<f4",
         "f64" => "<f8",
         _ => unreachable!("{kind}"),
@@ -49,6 +53,12 @@ impl Volume {
     /// The samples as they lie in a file, x fastest.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         self.samples.iter().flat_map(|&sample| bytes(self.kind, sample)).collect()
+    }
+
+    /// The same with the bytes of each sample in big-endian order.
+    pub(crate) fn big_endian_bytes(&self) -> Vec<u8> {
+        let samples = self.samples.iter();
+        samples.flat_map(|&sample| bytes(self.kind, sample).into_iter().rev().collect::<Vec<_>>()).collect()
     }
 
     /// What the command line has to say of the bytes.
@@ -101,11 +111,15 @@ pub(crate) fn random(seed: u64) -> f64 {
 /// What a sample of this type can hold of a number.
 fn held(kind: &str, number: f64) -> f64 {
     match kind {
+        "bool" => f64::from(number >= 0.5),
         "i8" => f64::from(number.round() as i8),
         "u8" => f64::from(number.round() as u8),
         "i16" => f64::from(number.round() as i16),
         "u16" => f64::from(number.round() as u16),
         "i32" => f64::from(number.round() as i32),
+        "u32" => f64::from(number.round() as u32),
+        "i64" => number.round() as i64 as f64,
+        "u64" => number.round() as u64 as f64,
         "f32" => f64::from(number as f32),
         _ => number,
     }
@@ -114,10 +128,13 @@ fn held(kind: &str, number: f64) -> f64 {
 fn bytes(kind: &str, sample: f64) -> Vec<u8> {
     match kind {
         "i8" => (sample as i8).to_le_bytes().to_vec(),
-        "u8" => (sample as u8).to_le_bytes().to_vec(),
+        "bool" | "u8" => (sample as u8).to_le_bytes().to_vec(),
         "i16" => (sample as i16).to_le_bytes().to_vec(),
         "u16" => (sample as u16).to_le_bytes().to_vec(),
         "i32" => (sample as i32).to_le_bytes().to_vec(),
+        "u32" => (sample as u32).to_le_bytes().to_vec(),
+        "i64" => (sample as i64).to_le_bytes().to_vec(),
+        "u64" => (sample as u64).to_le_bytes().to_vec(),
         "f32" => (sample as f32).to_le_bytes().to_vec(),
         _ => sample.to_le_bytes().to_vec(),
     }

@@ -27,7 +27,7 @@ struct Kept {
     path: PathBuf,
     /// All of it, but for the normals.
     mesh: MeshBuffer,
-    /// The box around the volume.
+    /// The box around the volume and its margin: where the mesh may be open.
     bounds: [[f32; 3]; 2],
 }
 
@@ -38,7 +38,7 @@ impl WholeSink {
         let kept = args.check.then(|| Kept {
             path: args.output.clone(),
             mesh: MeshBuffer::new(),
-            bounds: transform.corners([[0; 3], volume.lattice().map(|samples| samples - 1)]),
+            bounds: transform.corners([[0; 3], volume.lattice().map(|samples| samples - 1 + 2 * args.margin())]),
         });
         Ok(Self { transform, output: Output::create(&args.output)?, vertices: 0, triangles: 0, kept })
     }
