@@ -15,12 +15,16 @@ use marchless::MeshBuffer;
 ///
 /// The plugin spawns these where there is something to draw, and gives each its place, its `Aabb` and its `Mesh3d`.
 /// Samples live in the terrain's [`TerrainVolume`](crate::terrain::TerrainVolume). Despawning one ends its drawing, not its samples.
+///
+/// Chunks are made, never copied: the plugin despawns those that it has not made, such as those of a cloned terrain, which
+/// makes its own, or those that were written with a scene.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Component, Debug, PartialEq, Hash, Clone)]
 #[component(immutable)]
 #[require(ChunkGeometry, Transform, Visibility, NoAutoAabb)]
 pub struct Chunk {
     /// The terrain it belongs to.
+    #[entities]
     pub terrain: Entity,
     /// The level of detail that it is drawn in; 0 is the finest, and at present there is no other.
     pub level: u8,

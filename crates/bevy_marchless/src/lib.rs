@@ -99,7 +99,9 @@ pub mod prelude {
     pub use crate::source::*;
     pub use crate::stats::TerrainStats;
     pub use crate::stream::{Coverage, Leaf, LeafState, TerrainViewer};
-    pub use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainError, TerrainVolume};
+    pub use crate::terrain::{
+        Extent, Keep, Palette, SourceHandle, Terrain, TerrainError, TerrainSources, TerrainVolume,
+    };
     #[cfg(feature = "world_files")]
     pub use crate::world::{TerrainWorld, WorldDescription, WorldSource};
     pub use marchless::Region;

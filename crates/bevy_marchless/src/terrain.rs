@@ -1,11 +1,9 @@
 //! [`Terrain`]: a terrain's settings and source; give it to an entity, and chunks appear.
 
 mod extent;
+mod handle;
 mod prepare;
 mod volume;
-
-use core::fmt;
-use std::sync::Arc;
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_camera::visibility::Visibility;
@@ -18,6 +16,7 @@ use marchless::{DEFAULT_CHUNK_CELLS, Region, Source};
 use thiserror::Error;
 
 pub use extent::{Extent, Keep};
+pub use handle::{SourceHandle, TerrainSources};
 pub use volume::TerrainVolume;
 
 use crate::chunk::{Chunk, ChunkGeometry};
@@ -199,6 +198,14 @@ impl Terrain {
         self.keep.region(self.chunk_region(), self.chunk_cells)
     }
 
+    /// The same terrain with its source looked up, where that goes by name.
+    ///
+    /// # Errors
+    /// [`TerrainError::Source`].
+    fn resolved(&self, sources: &TerrainSources) -> Result<Self, TerrainError> {
+        Ok(Self { source: self.source.resolved(sources)?, ..self.clone() })
+    }
+
     /// What its samples are before anyone edits them.
     pub(crate) fn recipe(&self) -> Recipe {
         Recipe {
@@ -233,8 +240,9 @@ impl Default for Terrain {
 }
 
 /// Why a terrain's settings are refused. On the terrain's entity while that is so.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Error)]
+#[derive(Component, Reflect, Clone, Debug, PartialEq, Error)]
 #[reflect(Component, Debug, PartialEq, Clone)]
+#[component(clone_behavior = Ignore)]
 #[non_exhaustive]
 pub enum TerrainError {
     /// No chunk.
@@ -266,55 +274,18 @@ pub enum TerrainError {
         /// What was given, in world units.
         found: f32,
     },
+    /// A source by a name that the game has not registered.
+    #[error("a terrain's source must be registered in `TerrainSources`, but there is none of the name '{name}'")]
+    Source {
+        /// Its name.
+        name: String,
+    },
     /// NaN or infinite.
     #[error("a terrain's isovalue must be finite, but it is {found}")]
     Isovalue {
         /// What was given, in voxels.
         found: f32,
     },
-}
-
-/// A shared [`Source`].
-#[derive(Reflect, Clone)]
-#[reflect(opaque)]
-#[reflect(Default, Debug, Clone)]
-pub struct SourceHandle(Arc<dyn Source>);
-
-impl SourceHandle {
-    /// A handle to `source`.
-    pub fn new(source: impl Source) -> Self {
-        Self(Arc::new(source))
-    }
-
-    /// The source itself.
-    pub fn get(&self) -> &Arc<dyn Source> {
-        &self.0
-    }
-}
-
-impl From<Arc<dyn Source>> for SourceHandle {
-    fn from(source: Arc<dyn Source>) -> Self {
-        Self(source)
-    }
-}
-
-impl Default for SourceHandle {
-    fn default() -> Self {
-        Self::new(Air)
-    }
-}
-
-impl fmt::Debug for SourceHandle {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("SourceHandle(..)")
-    }
-}
-
-/// Handles are equal where they share one source.
-impl PartialEq for SourceHandle {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
-    }
 }
 
 /// The colours of materials, in order of their numbers. With fewer than 256 they repeat; with none, all is white.
@@ -384,7 +355,9 @@ pub struct TerrainPlugin;
 impl Plugin for TerrainPlugin {
     fn build(&self, app: &mut App) {
         crate::source::register_types(app);
-        app.register_type::<Terrain>()
+        app.init_resource::<TerrainSources>()
+            .init_resource::<prepare::CopiedChunks>()
+            .register_type::<Terrain>()
             .register_type::<TerrainVolume>()
             .register_type::<TerrainError>()
             .register_type::<Chunk>()
@@ -392,8 +365,13 @@ impl Plugin for TerrainPlugin {
             .register_type::<Leaf>()
             .register_type::<LeafState>()
             .register_type::<Coverage>()
+            .register_type::<SourceHandle>()
+            .add_observer(prepare::note_copied_chunk)
             .add_observer(prepare::forget_despawned_chunk)
             .add_observer(prepare::forget_removed_terrain)
-            .add_systems(PostUpdate, prepare::prepare_terrains.in_set(Phase::Prepare));
+            .add_systems(
+                PostUpdate,
+                (prepare::despawn_copied_chunks, prepare::prepare_terrains).in_set(Phase::Prepare),
+            );
     }
 }

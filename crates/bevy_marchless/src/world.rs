@@ -37,7 +37,7 @@
 //! fills it anew. Assets change when their file is read again (Bevy's feature `file_watcher` does so when it is saved,
 //! [`AssetServer::reload`] when it is asked to), and when a system changes them in [`Assets`].
 //!
-//! While a file is loading, and if it cannot be read, is cut short or holds bad settings, the terrain stays as it is;
+//! Stamps wait while a file is loading for the first time, and are applied to its world. Meanwhile, and if it cannot be read, is cut short or holds bad settings, the terrain stays as it is;
 //! each failure is told once in the log, with the line where it is. What was changed on the [`Terrain`](crate::terrain::Terrain)
 //! by hand stays until the file changes the same.
 //!
@@ -83,7 +83,7 @@ pub struct WorldPlugin;
 
 impl Plugin for WorldPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<TerrainWorld>();
+        app.register_type::<TerrainWorld>().add_observer(follow::forget_removed_world);
         register_asset(app);
     }
 

@@ -368,3 +368,41 @@ fn the_plugin_does_nothing_without_assets_and_may_come_before_them() {
     app.finish();
     assert!(app.world().contains_resource::<Assets<WorldDescription>>());
 }
+
+#[test]
+fn stamps_wait_for_a_world_that_is_being_read() {
+    let world = WorldDescription::new(WorldSource::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
+    let world = WorldDescription { extent: UVec3::splat(2).into(), ..world };
+    let mut game = Game::new();
+    game.write("a.world.ron", world.to_ron().unwrap());
+    game.write("bad.world.ron", "(");
+    let at = Vec3::new(20.0, 14.0, 20.0);
+    let dig = |terrain| Stamp::dig(terrain, BrushShape::sphere(at, 5.0));
+    // A new terrain, and one that is to become another.
+    let former = game.app.world_mut().spawn(ground_of_rock()).id();
+    settle(&mut game.app, former);
+    for entity in [game.app.world_mut().spawn_empty().id(), former] {
+        let handle = game.server().load("a.world.ron");
+        game.app.world_mut().entity_mut(entity).insert(TerrainWorld(handle));
+        game.app.world_mut().write_message(dig(entity));
+        game.app.update();
+        assert!(!volume(&game.app, entity).is_settled());
+        game.loaded(entity);
+        assert_as_new(&mut game.app, entity, &[dig(entity)]);
+    }
+    // A file that is no good makes nobody wait for ever, nor does one that is taken away.
+    let handle = game.server().load("bad.world.ron");
+    game.app.world_mut().entity_mut(former).insert(TerrainWorld(handle));
+    game.app.world_mut().write_message(Stamp::add(former, BrushShape::sphere(at, 5.0), 2));
+    update_until(&mut game.app, |app| volume(app, former).is_settled());
+    assert_as_new(&mut game.app, former, &[dig(former), Stamp::add(former, BrushShape::sphere(at, 5.0), 2)]);
+    let handle = game.server().load("b.world.ron");
+    game.app.world_mut().entity_mut(former).insert(TerrainWorld(handle)).remove::<TerrainWorld>();
+    game.app.world_mut().write_message(dig(former));
+    update_until(&mut game.app, |app| volume(app, former).is_settled());
+}
+
+/// All rock.
+fn ground_of_rock() -> Terrain {
+    small(Terrain::new(|_: [f64; 3]| -9.0))
+}

@@ -1,5 +1,7 @@
 //! [`Source`]: what a terrain is before anyone edits it, sampled box by box.
 
+use core::any::Any;
+
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 
@@ -89,7 +91,9 @@ pub enum Bound {
 /// let ball = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - 10.0;
 /// let source: Box<dyn Source> = Box::new(ball);
 /// ```
-pub trait Source: Send + Sync + 'static {
+///
+/// A source of a known type can be had back from a `dyn Source`, which is an [`Any`].
+pub trait Source: Any + Send + Sync {
     /// Samples every point of `region`.
     ///
     /// `distances`: `[nx·ny·nz]`, x fastest, to be filled with distances in voxels of this level (world distance

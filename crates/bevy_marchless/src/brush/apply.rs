@@ -47,7 +47,7 @@ pub(super) fn read_stamps(
 /// chunks to be meshed.
 ///
 /// A stamp that needs samples that were dropped waits for them, and the terrain's stamps behind it wait with it; so do
-/// stamps on disabled terrains, and on those whose source is about to change.
+/// stamps on disabled terrains, and on those whose source is about to change or whose world's file is being read.
 pub(super) fn apply_stamps(
     mut queue: ResMut<StampQueue>,
     mut volumes: Query<(Entity, &mut TerrainVolume)>,
@@ -67,6 +67,9 @@ pub(super) fn apply_stamps(
             }
             return waits;
         };
+        if volume.is_loading() {
+            return true;
+        }
         let Some(isovalue) = volume.settings().map(|settings| settings.isovalue) else {
             bevy_log::warn!("a stamp is dropped: the settings of terrain {terrain} were refused");
             return false;

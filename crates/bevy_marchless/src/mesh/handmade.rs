@@ -39,11 +39,10 @@ use crate::volume::Meshed;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug)]
-#[reflect(Component, Debug, Clone, from_reflect = false)]
+#[reflect(Component, Default, Debug, Clone)]
 #[require(ChunkGeometry, Transform, Visibility, NoAutoAabb, MeshingState)]
 pub struct ChunkSamples {
-    #[reflect(ignore)]
-    data: Arc<Data>,
+    data: Shared,
     /// The surface lies where the weight equals this many voxels; finite. Default 0.
     pub isovalue: f32,
     /// Whether the mesh has normals. Default true.
@@ -53,6 +52,12 @@ pub struct ChunkSamples {
 }
 
 /// What the samples are, shared with the jobs that mesh them.
+#[derive(Reflect, Clone, Debug)]
+#[reflect(opaque)]
+#[reflect(Default, Debug, Clone)]
+#[cfg_attr(feature = "serde", reflect(Serialize, Deserialize))]
+struct Shared(Arc<Data>);
+
 #[derive(Debug)]
 struct Data {
     shape: Shape,
@@ -61,19 +66,54 @@ struct Data {
     materials: Vec<u8>,
 }
 
+impl Shared {
+    fn new(shape: UVec3, weights: Vec<i16>, materials: Vec<u8>) -> Result<Self, ChunkSamplesError> {
+        if shape.min_element() < 2 {
+            return Err(ChunkSamplesError::TooSmall { found: shape });
+        }
+        let shape = Shape::new(shape.to_array())?;
+        let samples = Samples::new(shape, &weights)?;
+        if !materials.is_empty() {
+            samples.with_materials(&materials)?;
+        }
+        Ok(Self(Arc::new(Data { shape, weights, materials })))
+    }
+}
+
+/// Air.
+impl Default for Shared {
+    fn default() -> Self {
+        Self::new(UVec3::splat(2), vec![i16::MAX; 8], Vec::new()).expect("8 weights of 2 × 2 × 2 samples")
+    }
+}
+
+/// Samples as they are written: shape, weights and materials.
+#[cfg(feature = "serde")]
+type Written = (UVec3, Vec<i16>, Vec<u8>);
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for Shared {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Data { shape, weights, materials } = &*self.0;
+        (UVec3::from(shape.size()), weights, materials).serialize(serializer)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Shared {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let (shape, weights, materials) = Written::deserialize(deserializer)?;
+        Self::new(shape, weights, materials).map_err(serde::de::Error::custom)
+    }
+}
+
 impl ChunkSamples {
     /// `weights`: signed distances in 1/256 voxel, negative inside; `[x·y·z]` of `shape`, x fastest.
     ///
     /// # Errors
     /// [`ChunkSamplesError`] where an axis has fewer than 2 samples or the length is not the shape's.
     pub fn new(shape: UVec3, weights: Vec<i16>) -> Result<Self, ChunkSamplesError> {
-        if shape.min_element() < 2 {
-            return Err(ChunkSamplesError::TooSmall { found: shape });
-        }
-        let shape = Shape::new(shape.to_array())?;
-        Samples::new(shape, &weights)?;
-        let data = Arc::new(Data { shape, weights, materials: Vec::new() });
-        Ok(Self { data, isovalue: 0.0, normals: true, palette: Palette::default() })
+        Ok(Self { data: Shared::new(shape, weights, Vec::new())?, ..Self::default() })
     }
 
     /// The same from signed distances in voxels, rounded to 1/256 and saturated at ±128 voxels.
@@ -89,29 +129,30 @@ impl ChunkSamples {
     /// # Errors
     /// [`ChunkSamplesError::Samples`] where the length is not the shape's.
     pub fn with_materials(self, materials: Vec<u8>) -> Result<Self, ChunkSamplesError> {
-        let (shape, weights) = (self.data.shape, self.data.weights.clone());
-        Samples::new(shape, &weights)?.with_materials(&materials)?;
-        Ok(Self { data: Arc::new(Data { shape, weights, materials }), ..self })
+        let data = &self.data.0;
+        Samples::new(data.shape, &data.weights)?.with_materials(&materials)?;
+        let data = Data { shape: data.shape, weights: data.weights.clone(), materials };
+        Ok(Self { data: Shared(Arc::new(data)), ..self })
     }
 
     /// Samples per axis.
     pub fn shape(&self) -> UVec3 {
-        self.data.shape.size().into()
+        self.data.0.shape.size().into()
     }
 
     /// The weights, in 1/256 voxel, x fastest.
     pub fn weights(&self) -> &[i16] {
-        &self.data.weights
+        &self.data.0.weights
     }
 
     /// The materials, x fastest; empty where there are none.
     pub fn materials(&self) -> &[u8] {
-        &self.data.materials
+        &self.data.0.materials
     }
 
     /// The job that meshes the samples as they are now.
     fn mesh_job(&self, screen: &Screen) -> impl FnOnce() -> Meshed + Send + 'static {
-        let data = self.data.clone();
+        let Shared(data) = self.data.clone();
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
         let style = screen.style(&Arc::new(self.palette.to_vertex_colors()));
         move || {
@@ -127,6 +168,13 @@ impl ChunkSamples {
                 .expect("the lengths have been checked");
             mesh_with([0; 3], style.as_ref(), None, |mesher, _, out| mesher.mesh(samples, &settings, out))
         }
+    }
+}
+
+/// Air, of 2 × 2 × 2 samples.
+impl Default for ChunkSamples {
+    fn default() -> Self {
+        Self { data: Shared::default(), isovalue: 0.0, normals: true, palette: Palette::default() }
     }
 }
 

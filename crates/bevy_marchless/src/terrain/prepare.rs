@@ -7,7 +7,7 @@ use bevy_platform::time::Instant;
 use bevy_transform::components::Transform;
 use std::sync::Arc;
 
-use super::{Terrain, TerrainError, TerrainVolume};
+use super::{Terrain, TerrainError, TerrainSources, TerrainVolume};
 use crate::budget::FrameBudget;
 use crate::chunk::{Chunk, ChunkKey, chunk_transform};
 use crate::schedule::MakesMeshes;
@@ -21,19 +21,24 @@ pub(crate) fn prepare_terrains(
     mut terrains: Query<(Entity, Ref<Terrain>, &mut TerrainVolume, Has<TerrainError>)>,
     mut transforms: Query<&mut Transform, With<Chunk>>,
     meshes: Option<Res<MakesMeshes>>,
+    sources: Res<TerrainSources>,
     mut commands: Commands,
     mut budget: ResMut<FrameBudget>,
 ) {
     let start = Instant::now();
     for (entity, terrain, mut volume, was_refused) in &mut terrains {
-        if volume.is_new(terrain.last_changed()) {
+        if volume.is_loading() && volume.settings().is_none() {
+            continue; // Nobody wants to see the default settings first.
+        }
+        let may_be_another = sources.is_changed() && terrain.source.name().is_some();
+        if may_be_another || volume.is_new(terrain.last_changed()) {
             let volume = &mut *volume;
-            match terrain.check() {
-                Ok(()) => {
+            match terrain.check().and_then(|()| terrain.resolved(&sources)) {
+                Ok(resolved) => {
                     if was_refused {
                         commands.entity(entity).try_remove::<TerrainError>();
                     }
-                    volume.accept(&terrain, terrain.last_changed());
+                    volume.accept(&resolved, terrain.last_changed());
                     follow_settings(volume);
                 }
                 Err(error) => {
@@ -90,6 +95,30 @@ fn place_chunks(terrain: &Terrain, heart: &Heart, transforms: &mut Query<&mut Tr
             *transform = chunk_transform(key.position, terrain.chunk_cells, terrain.voxel_size);
         }
     }
+}
+
+/// Chunks that are not the plugin's own: copies, by cloning a terrain or by reading a scene, and what a game has put there.
+#[derive(Resource, Default)]
+pub(crate) struct CopiedChunks(Vec<Entity>);
+
+/// Chunks are made, never copied: one that its terrain does not know of goes. Not at once, since somebody may be about to
+/// give it more components.
+pub(crate) fn note_copied_chunk(
+    added: On<Add, Chunk>,
+    chunks: Query<&Chunk, Allow<Disabled>>,
+    volumes: Query<&TerrainVolume, Allow<Disabled>>,
+    mut copied: ResMut<CopiedChunks>,
+) {
+    let Ok(chunk) = chunks.get(added.entity) else { return };
+    let key = ChunkKey { level: chunk.level, position: chunk.position.to_array() };
+    let drawn = volumes.get(chunk.terrain).ok().and_then(|volume| volume.heart().entity(key));
+    if drawn != Some(added.entity) {
+        copied.0.push(added.entity);
+    }
+}
+
+pub(crate) fn despawn_copied_chunks(mut copied: ResMut<CopiedChunks>, mut commands: Commands) {
+    copied.bypass_change_detection().0.drain(..).for_each(|chunk| commands.entity(chunk).try_despawn());
 }
 
 /// A despawned chunk is drawn no more. Its samples stay: its neighbours' meshes need them.

@@ -12,9 +12,10 @@ use crate::cover::{Coverage, Leaf};
 use crate::volume::Heart;
 
 /// A terrain's samples, and what is shown of them. The plugin fills and changes them; read them here, change them with
-/// [`Stamp`](crate::brush::Stamp) messages.
+/// [`Stamp`](crate::brush::Stamp) messages. It is neither cloned nor written with its terrain: that has its own.
 #[derive(Component, Reflect, Default)]
 #[reflect(Component, Default, from_reflect = false)]
+#[component(clone_behavior = Ignore)]
 pub struct TerrainVolume {
     /// The settings in effect.
     #[reflect(ignore)]
@@ -31,6 +32,9 @@ pub struct TerrainVolume {
     /// When the settings that were looked at last had been changed.
     #[reflect(ignore)]
     seen: Option<Tick>,
+    /// Whether a file with other settings is being read.
+    #[reflect(ignore)]
+    is_loading: bool,
     #[reflect(ignore)]
     heart: Heart,
 }
@@ -77,12 +81,12 @@ impl TerrainVolume {
 
     /// Whether all chunks in range have their samples.
     pub fn is_filled(&self) -> bool {
-        self.next.is_none() && self.heart.is_filled()
+        !self.is_loading && self.next.is_none() && self.heart.is_filled()
     }
 
     /// Whether all chunks in range have their samples and everything is drawn as it is.
     pub fn is_settled(&self) -> bool {
-        self.next.is_none() && self.heart.is_settled()
+        !self.is_loading && self.next.is_none() && self.heart.is_settled()
     }
 
     /// How much memory the samples take, in bytes: what is drawn, what is newest, and the plugin's notes about each chunk.
@@ -96,6 +100,16 @@ impl TerrainVolume {
 
     pub(crate) const fn heart_mut(&mut self) -> &mut Heart {
         &mut self.heart
+    }
+
+    /// Whether a file with other settings is being read: stamps are for those.
+    pub(crate) const fn is_loading(&self) -> bool {
+        self.is_loading
+    }
+
+    #[cfg(feature = "world_files")]
+    pub(crate) const fn set_loading(&mut self, is_loading: bool) {
+        self.is_loading = is_loading;
     }
 
     /// How often other samples have been asked for: stamps of earlier ones are gone.

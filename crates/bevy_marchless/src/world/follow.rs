@@ -4,19 +4,30 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use bevy_asset::{AssetEvent, AssetId, AssetLoadError, AssetServer, Assets, LoadState};
+use bevy_ecs::change_detection::Tick;
+use bevy_ecs::entity_disabling::Disabled;
 use bevy_ecs::prelude::*;
+use bevy_ecs::query::Allow;
 
 use super::{TerrainWorld, WorldDescription, WorldError};
-use crate::terrain::Terrain;
+use crate::terrain::{Terrain, TerrainVolume};
 
-/// The world that a terrain was made last.
+/// What is known of a terrain's world.
 #[derive(Component, Default)]
-pub(super) struct Followed(Option<WorldDescription>);
+pub(super) struct Followed {
+    /// The world that the terrain was made last.
+    world: Option<WorldDescription>,
+    /// When the handle that was looked at last had been changed: so no change is missed while the terrain is disabled.
+    seen: Option<Tick>,
+    /// Whether the terrain is to be another one, whose file has not been read yet.
+    is_loading: bool,
+}
 
-/// Gives terrains what has changed in their worlds.
+/// Gives terrains what has changed in their worlds. Stamps on a terrain wait while its file is being read.
 pub(super) fn follow_worlds(
-    mut terrains: Query<(Entity, Ref<TerrainWorld>, &mut Terrain, &mut Followed)>,
+    mut terrains: Query<(Entity, Ref<TerrainWorld>, &mut Terrain, &mut TerrainVolume, &mut Followed)>,
     worlds: Res<Assets<WorldDescription>>,
+    server: Res<AssetServer>,
     mut events: MessageReader<AssetEvent<WorldDescription>>,
 ) {
     let changed: HashSet<_> = events
@@ -26,20 +37,36 @@ pub(super) fn follow_worlds(
             _ => None,
         })
         .collect();
-    for (entity, handle, mut terrain, mut followed) in &mut terrains {
-        if !handle.is_changed() && !changed.contains(&handle.0.id()) {
+    for (entity, handle, mut terrain, mut volume, mut followed) in &mut terrains {
+        let is_new = followed.seen.replace(handle.last_changed()) != Some(handle.last_changed());
+        let may_be_another = is_new || followed.is_loading;
+        if !may_be_another && !changed.contains(&handle.0.id()) {
             continue;
         }
-        let Some(world) = worlds.get(&handle.0).filter(|world| followed.0.as_ref() != Some(*world)) else { continue };
+        let world = worlds.get(&handle.0);
+        followed.is_loading = world.is_none() && matches!(server.load_state(&handle.0), LoadState::Loading);
+        volume.set_loading(followed.is_loading);
+        let Some(world) = world.filter(|world| followed.world.as_ref() != Some(*world)) else { continue };
         // Only what is applied counts as a change of the terrain.
         let mut next = terrain.clone();
-        match world.apply(followed.0.as_ref(), &mut next) {
+        match world.apply(followed.world.as_ref(), &mut next) {
             Ok(()) => {
                 *terrain = next;
-                followed.0 = Some(world.clone());
+                followed.world = Some(world.clone());
             }
             Err(error) => bevy_log::warn!("terrain {entity}: its world is not applied, and it stays as it is: {error}"),
         }
+    }
+}
+
+/// Without its world a terrain waits for nothing.
+pub(super) fn forget_removed_world(
+    removed: On<Remove, TerrainWorld>,
+    mut terrains: Query<(&mut TerrainVolume, &mut Followed), Allow<Disabled>>,
+) {
+    if let Ok((mut volume, mut followed)) = terrains.get_mut(removed.entity) {
+        volume.set_loading(false);
+        *followed = Followed::default();
     }
 }
 
