@@ -41,12 +41,10 @@ pub(crate) fn plugin(app: &mut App) {
 fn free_pieces(
     mut edits: MessageReader<TerrainEdited>,
     bits: TerrainBits,
-    terrains: Query<&Terrain>,
     mut stamps: MessageWriter<Stamp>,
     mut commands: Commands,
 ) {
     for edited in edits.read() {
-        let Ok(terrain) = terrains.get(edited.terrain) else { continue };
         let Ok(pieces) = bits.loose_pieces(edited, MARGIN) else { continue };
         for piece in &pieces {
             stamps.write_batch(piece.stamps(edited.terrain));
