@@ -32,7 +32,7 @@
 //! meshed from one snapshot and shown in one update, a small edit in the update that reads its stamp. A
 //! [`TerrainQuery`](query::TerrainQuery) tells what a ray hits. Everything runs in `PostUpdate`
 //! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame. How
-//! chunks get components of a game's own, module [`inherit`] tells.
+//! chunks get components of a game's own, module [`inherit`] tells; how terrain gets on with the rest of Bevy, module [`in_your_game`].
 //!
 //! # What is guaranteed
 //! - The same stamps in the same order give the same samples, bit for bit, on any machine, whatever the threads do and
@@ -61,6 +61,10 @@ mod budget;
 pub mod chunk;
 mod cover;
 pub mod debug;
+/// How terrain gets on with the rest of Bevy: states, parents, visibility, picking, time, pausing and more.
+///
+#[cfg_attr(feature = "pbr", doc = include_str!("../docs/in_your_game.md"))]
+pub mod in_your_game {}
 pub mod inherit;
 mod jobs;
 #[cfg(feature = "pbr")]

@@ -28,7 +28,7 @@ pub(crate) fn plugin(app: &mut App) {
 
 /// The camera is there in the menu, too.
 fn spawn_camera(mut commands: Commands) {
-    commands.spawn(fly_camera(Vec3::new(64.0, 80.0, 200.0), Vec3::new(64.0, 45.0, 64.0)));
+    commands.spawn(fly_camera(Vec3::new(64.0, 130.0, 220.0), Vec3::new(64.0, 50.0, 64.0)));
 }
 
 fn spawn_level(mut commands: Commands) {
@@ -40,7 +40,7 @@ fn spawn_level(mut commands: Commands) {
         .with_material(2);
     commands.spawn((
         Terrain::new(island).with_extent(UVec3::new(2, 1, 2)),
-        Transform::from_xyz(32.0, 76.0, 24.0),
+        Transform::from_xyz(32.0, 96.0, 24.0),
         Island,
         layers::of_island(),
         DespawnOnExit(Screen::Level),
@@ -49,7 +49,7 @@ fn spawn_level(mut commands: Commands) {
     let wall = Sdf::cuboid(Vec3::new(64.0, 32.0, 16.0), Vec3::new(60.0, 28.0, 4.0)).with_material(5);
     commands.spawn((
         Terrain::new(wall).with_extent(UVec3::new(4, 2, 1)),
-        Transform::from_xyz(0.0, 30.0, 140.0),
+        Transform::from_xyz(0.0, 60.0, 140.0),
         Visibility::Hidden,
         Wall,
         DespawnOnExit(Screen::Level),
