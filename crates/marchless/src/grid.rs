@@ -81,12 +81,12 @@ impl<W: Weight> Grid<W> {
     pub fn bounded(chunk_cells: u32, chunks: Region) -> Result<Self, GridError> {
         let mut grid = Self::new(chunk_cells)?;
         grid.set_bounds(Some(chunks))?;
-        grid.take_dirty();
         Ok(grid)
     }
 
     /// Gives the grid other bounds, or none. Chunks beyond them stay in memory, but are not seen, until the bounds hold them
-    /// again. Chunks at the old and at the new border are marked dirty.
+    /// again. Nothing is marked dirty: what changes are the meshes of chunks at the old border and at the new one, and of
+    /// those that are seen for the first time.
     ///
     /// # Errors
     /// [`GridError::Bounds`] where `bounds` is empty or its lattice points do not fit in `i32`; nothing is changed then.
@@ -95,18 +95,7 @@ impl<W: Weight> Grid<W> {
         if let Some(bounds) = bounds.filter(|bounds| bounds.is_empty() || bounds.intersection(&limits) != *bounds) {
             return Err(GridError::Bounds { bounds, limits });
         }
-        let former = core::mem::replace(&mut self.bounds, bounds);
-        if former == bounds {
-            return Ok(());
-        }
-        // Of a chunk within either bounds, the mesh changes unless the chunk is inner to both.
-        let is_inner = |position: [i32; 3], bounds: Option<Region>| {
-            bounds.is_none_or(|Region { min, max }| (0..3).all(|i| min[i] < position[i] && position[i] < max[i] - 1))
-        };
-        for (position, _) in self.chunks.iter().filter(|(p, _)| !is_inner(*p, former) || !is_inner(*p, bounds)) {
-            let around = Region::new(position, position).grown(1, 2);
-            self.dirty.extend(bounds.map_or(around, |bounds| bounds.intersection(&around)).points());
-        }
+        self.bounds = bounds;
         Ok(())
     }
 

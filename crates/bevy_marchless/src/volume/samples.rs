@@ -131,7 +131,6 @@ impl Samples {
     pub(super) fn resize(&mut self, extent: Region) {
         for grid in [&mut self.newest, &mut self.shown] {
             grid.set_bounds(Some(extent)).expect("the settings have been checked");
-            grid.take_dirty();
         }
     }
 
