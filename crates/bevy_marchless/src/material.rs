@@ -53,7 +53,7 @@ impl Plugin for MaterialPlugin {
 struct MaterialTypes(Vec<ComponentId>);
 
 /// On terrains and hand-made chunks that have been given the plain material.
-#[derive(Component)]
+#[derive(Component, Clone)]
 struct PlainMaterial;
 
 /// Gives terrains and hand-made chunks without any material a plain one, which shows the palette's colours, and takes it

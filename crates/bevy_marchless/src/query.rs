@@ -34,6 +34,7 @@ impl Plugin for QueryPlugin {
 /// Questions to all terrains, in world space.
 ///
 /// Terrains are where they were when transforms were last propagated, and rays hit what is drawn, not what is about to be.
+/// Only where the extent has just changed, walls and chunks that are about to go may be drawn for some updates and not be hit.
 /// Where nobody propagates transforms, as with Bevy's `MinimalPlugins` alone, the plugin itself does it at the end of
 /// `PostUpdate`, for the entities of terrains only.
 ///

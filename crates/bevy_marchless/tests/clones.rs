@@ -69,9 +69,17 @@ fn chunks_that_nobody_manages_go() {
     let own = volume(&app, terrain).chunk_entity(position).expect("it is drawn");
     let copy = app.world_mut().spawn_empty().id();
     EntityCloner::build_opt_out(app.world_mut()).clone_entity(own, copy);
+    // Once it is no chunk, a copy is the game's own.
+    let debris = app.world_mut().spawn_empty().id();
+    EntityCloner::build_opt_out(app.world_mut()).clone_entity(own, debris);
+    app.world_mut().entity_mut(debris).remove::<(Chunk, ChildOf)>();
     let stranger = app.world_mut().spawn(Chunk { terrain: copy, level: 0, position }).id();
     app.update();
     assert!(app.world().get_entity(copy).is_err() && app.world().get_entity(stranger).is_err());
+    assert!(app.world().get::<ChunkGeometry>(debris).is_some_and(|geometry| !geometry.mesh.is_empty()));
     assert_no_copies(&mut app, &[terrain]);
+    let own = geometry(&mut app, terrain);
+    app.world_mut().despawn(debris);
+    assert_eq!(own.len(), geometry(&mut app, terrain).len());
     assert_drawn(&mut app, terrain);
 }

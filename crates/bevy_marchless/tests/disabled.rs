@@ -252,3 +252,19 @@ fn samples_by_hand_changed_meanwhile() {
         assert_eq!(height(&app, entity), Some(5.5));
     }
 }
+
+#[test]
+fn named_sources_that_come_while_it_is_disabled_are_not_missed() {
+    let mut app = app();
+    let named = small(Terrain { source: SourceHandle::named("flat"), ..Terrain::default() });
+    let terrain = app.world_mut().spawn(named).id();
+    app.update();
+    assert!(app.world().get::<TerrainError>(terrain).is_some());
+    app.world_mut().entity_mut(terrain).insert(Disabled);
+    app.world_mut().resource_mut::<TerrainSources>().insert("flat", |[_, y, _]: [f64; 3]| y - 16.5);
+    (0..3).for_each(|_| app.update());
+    app.world_mut().entity_mut(terrain).remove::<Disabled>();
+    settle(&mut app, terrain);
+    assert!(app.world().get::<TerrainError>(terrain).is_none() && !geometry(&mut app, terrain).is_empty());
+    assert_drawn(&mut app, terrain);
+}

@@ -110,3 +110,32 @@ fn many_chunks_are_passed_over_and_the_rest_is_budgeted() {
     let loaded = app.world().resource::<TerrainStats>().loaded - before;
     assert_eq!(loaded, 50 * 6 * 50 - 48 * 4 * 48, "only what is new");
 }
+
+#[test]
+fn a_viewer_that_is_nowhere_holds_nothing_up() {
+    let mut app = app();
+    let ends = Extent::new(IVec3::ZERO, IVec3::new(4, 2, 4));
+    let viewer = (TerrainViewer::new(40.0), bevy_transform::components::Transform::from_xyz(16.0, 9.0, 16.0));
+    let viewer = app.world_mut().spawn(viewer).id();
+    let terrain = settled(&mut app, hills(UVec3::ONE).with_extent(ends).with_keep(Keep::Nothing));
+    app.world_mut().get_mut::<TerrainViewer>(viewer).expect("it is there").radii = Vec3::ZERO;
+    app.update();
+    resize(&mut app, terrain, Extent::new(IVec3::new(-1, 0, 0), IVec3::new(6, 2, 5)));
+    dig(&mut app, terrain, Vec3::new(1.0, 9.0, 12.0), 4.0);
+    settle(&mut app, terrain);
+    assert!(entities(&mut app).keys().any(|position| position.x == -1), "it sees what it saw, in the new extent");
+    assert!(volume(&app, terrain).shown().get([1, 9, 12]).weight > 0);
+}
+
+#[test]
+fn digs_at_a_wall_ask_for_nothing_beyond() {
+    let mut app = app();
+    let terrain = settled(&mut app, hills(UVec3::new(4, 2, 4)));
+    let before = app.world().resource::<TerrainStats>().filled;
+    for _ in 0..100 {
+        dig(&mut app, terrain, Vec3::new(31.0, 4.0, 12.0), 3.0);
+        assert!(volume(&app, terrain).is_filled());
+    }
+    settle(&mut app, terrain);
+    assert_eq!(app.world().resource::<TerrainStats>().filled, before, "nothing is sampled");
+}

@@ -111,7 +111,7 @@ impl<W: Weight> Grid<W> {
 
     /// The outermost lattice planes of a bounded grid: points at `min` and at `max` lie on them, both included.
     pub fn planes(&self) -> Option<Region> {
-        let scaled = |v: i32| v * self.cells as i32; // fits: checked when the grid was made
+        let scaled = |v: i32| v * self.cells as i32; // fits: checked by `set_bounds`
         self.bounds.map(|bounds| Region::new(bounds.min.map(scaled), bounds.max.map(scaled)))
     }
 
@@ -390,7 +390,7 @@ impl<W: Weight> Grid<W> {
         if bounds.contains(position) { Ok(()) } else { Err(GridError::OutOfBounds { position, bounds }) }
     }
 
-    /// The chunk positions that may be present: the bounds, or all whose blocks fit in `i32`.
+    /// The chunk positions that are seen where there is a chunk: the bounds, or all whose blocks fit in `i32`.
     pub(crate) fn limits(&self) -> Region {
         self.bounds.unwrap_or_else(|| Self::largest(self.cells))
     }

@@ -130,7 +130,7 @@ impl Recipe {
         let shape = Shape::cube(self.cells).expect("a chunk has samples");
         let samples = Samples::new(shape, &samples.weights).expect("the grid has checked their number");
         let mut bits = BitGrid::from_samples(samples, self.isovalue)?;
-        // Samples there are half a voxel outside; meshes at a higher isovalue are cut off as well.
+        // Meshes are cut off there.
         for axis in (0..3).filter(|axis| self.lowest[*axis]) {
             let mut layer = Region::new([0; 3], [self.cells as i32; 3]);
             layer.max[axis] = 1;

@@ -181,6 +181,13 @@ impl View {
         Self { range, margin, samples, forward, bounds }
     }
 
+    /// The same view of a terrain with another extent.
+    #[must_use]
+    pub(crate) fn with_extent(self, extent: Region) -> Self {
+        let of = |range: Range| Range { extent, ..range };
+        Self::new(of(self.range), self.margin, self.samples.map(of), self.forward)
+    }
+
     /// The same view, looking elsewhere.
     #[must_use]
     pub(crate) const fn facing(self, forward: [f64; 3]) -> Self {

@@ -218,6 +218,7 @@ impl ViewOf<'_> {
         let mut look = Look { terrain: settings, to_terrain, reported: self.reported };
         let place = if self.is_floating { seen.propagated } else { seen.now };
         let view = place.and_then(|place| look.at(self.terrain, viewer, &seen.settings, &place, known));
-        view.map(|view| (seen.settings, view)).or(known)
+        let as_before = || known.map(|(before, view)| (before, view.with_extent(settings.chunk_region())));
+        view.map(|view| (seen.settings, view)).or_else(as_before)
     }
 }

@@ -30,7 +30,7 @@ pub(crate) fn prepare_terrains(
         if volume.is_loading() && volume.settings().is_none() {
             continue; // Nobody wants to see the default settings first.
         }
-        let may_be_another = sources.is_changed() && terrain.source.name().is_some();
+        let may_be_another = volume.has_other_sources(sources.last_changed()) && terrain.source.name().is_some();
         if may_be_another || volume.is_new(terrain.last_changed()) {
             let volume = &mut *volume;
             match terrain.check().and_then(|()| terrain.resolved(&sources)) {
@@ -117,8 +117,15 @@ pub(crate) fn note_copied_chunk(
     }
 }
 
-pub(crate) fn despawn_copied_chunks(mut copied: ResMut<CopiedChunks>, mut commands: Commands) {
-    copied.bypass_change_detection().0.drain(..).for_each(|chunk| commands.entity(chunk).try_despawn());
+/// Despawns what has been noted, but for what is no chunk any more.
+pub(crate) fn despawn_copied_chunks(
+    mut copied: ResMut<CopiedChunks>,
+    chunks: Query<(), (With<Chunk>, Allow<Disabled>)>,
+    mut commands: Commands,
+) {
+    for chunk in copied.bypass_change_detection().0.drain(..).filter(|chunk| chunks.contains(*chunk)) {
+        commands.entity(chunk).try_despawn();
+    }
 }
 
 /// A despawned chunk is drawn no more. Its samples stay: its neighbours' meshes need them.

@@ -32,6 +32,9 @@ pub struct TerrainVolume {
     /// When the settings that were looked at last had been changed.
     #[reflect(ignore)]
     seen: Option<Tick>,
+    /// When the sources that were looked at last had been changed.
+    #[reflect(ignore)]
+    sources: Option<Tick>,
     /// Whether a file with other settings is being read.
     #[reflect(ignore)]
     is_loading: bool,
@@ -125,6 +128,11 @@ impl TerrainVolume {
     /// Whether settings wait that ask for other samples: stamps are for those.
     pub(crate) const fn has_next(&self) -> bool {
         self.next.is_some()
+    }
+
+    /// Whether the named sources that were changed then have not been looked at. From now on, they have.
+    pub(super) fn has_other_sources(&mut self, changed: Tick) -> bool {
+        self.sources.replace(changed) != Some(changed)
     }
 
     /// Whether settings that were changed then have not been looked at.

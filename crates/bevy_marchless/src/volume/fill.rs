@@ -168,7 +168,7 @@ impl Heart {
         }
         let (edit, affected) = self.samples.load(key.position, chunk, replayed);
         self.late_edits.extend(Some(edit).filter(|edit| !edit.is_empty()));
-        // At the border the samples have been clipped.
+        // At the border meshes clip the samples.
         let at_border = self.samples.newest().bounds().is_some_and(|bounds| {
             (0..3).any(|axis| [bounds.min[axis], bounds.max[axis] - 1].contains(&key.position[axis]))
         });

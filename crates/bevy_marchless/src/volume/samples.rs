@@ -231,7 +231,8 @@ impl Samples {
         let held = if may_be_held { region.points().filter(|position| self.is_held(*position)).count() } else { 0 };
         let at_node = self.log.insert(number, stamp, region, held as u32);
         if at_node > MOST_STAMPS as usize {
-            changed.crowded = region.points().filter(|position| self.is_crowded(*position)).collect();
+            let seen = region.intersection(&bounds);
+            changed.crowded = seen.points().filter(|position| self.is_crowded(*position)).collect();
         }
         changed
     }

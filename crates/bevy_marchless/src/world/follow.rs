@@ -4,7 +4,6 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use bevy_asset::{AssetEvent, AssetId, AssetLoadError, AssetServer, Assets, LoadState};
-use bevy_ecs::change_detection::Tick;
 use bevy_ecs::entity_disabling::Disabled;
 use bevy_ecs::prelude::*;
 use bevy_ecs::query::Allow;
@@ -17,15 +16,13 @@ use crate::terrain::{Terrain, TerrainVolume};
 pub(super) struct Followed {
     /// The world that the terrain was made last.
     world: Option<WorldDescription>,
-    /// When the handle that was looked at last had been changed: so no change is missed while the terrain is disabled.
-    seen: Option<Tick>,
     /// Whether the terrain is to be another one, whose file has not been read yet.
     is_loading: bool,
 }
 
-/// Gives terrains what has changed in their worlds. Stamps on a terrain wait while its file is being read.
+/// Gives terrains, disabled ones too, what has changed in their worlds. Stamps on a terrain wait while its file is being read.
 pub(super) fn follow_worlds(
-    mut terrains: Query<(Entity, Ref<TerrainWorld>, &mut Terrain, &mut TerrainVolume, &mut Followed)>,
+    mut terrains: Query<(Entity, Ref<TerrainWorld>, &mut Terrain, &mut TerrainVolume, &mut Followed), Allow<Disabled>>,
     worlds: Res<Assets<WorldDescription>>,
     server: Res<AssetServer>,
     mut events: MessageReader<AssetEvent<WorldDescription>>,
@@ -38,8 +35,7 @@ pub(super) fn follow_worlds(
         })
         .collect();
     for (entity, handle, mut terrain, mut volume, mut followed) in &mut terrains {
-        let is_new = followed.seen.replace(handle.last_changed()) != Some(handle.last_changed());
-        let may_be_another = is_new || followed.is_loading;
+        let may_be_another = handle.is_changed() || followed.is_loading;
         if !may_be_another && !changed.contains(&handle.0.id()) {
             continue;
         }

@@ -7,7 +7,7 @@ use super::occupancy::Occupancy;
 use crate::lattice::Region;
 use crate::sample::Weight;
 
-/// A map from chunk positions to chunks. All positions lie within the limits of a grid.
+/// A map from chunk positions to chunks. All positions are such as there can be in a grid.
 #[derive(Clone, Debug)]
 pub(super) struct Chunks<W> {
     map: BTreeMap<[i32; 3], Chunk<W>>,

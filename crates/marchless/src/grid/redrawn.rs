@@ -17,6 +17,8 @@ use crate::lattice::{Region, Samples, Shape};
 use crate::mesher::{MeshSettings, Topology};
 use crate::sample::Weight;
 
+/// At the border isovalues farther from 0, in voxels, are not looked into: half a voxel more may be the same `f32`.
+const MOST_AT_BORDER: f32 = 1e6;
 /// Samples read around the changed ones, either way: the neighbours of their neighbours.
 const REACH: u32 = 2;
 
@@ -28,7 +30,7 @@ impl<W: Weight> Grid<W> {
     /// ([`Chunk::AIR`], where it was absent). `settings`: of the meshes.
     ///
     /// `None` where that is not looked into: for boxes of more than 60 points along an axis, isovalues that are not
-    /// finite, and isovalues beyond the weights' range at the border of a bounded grid.
+    /// finite, and isovalues that are extreme or beyond the weights' range at the border of a bounded grid.
     pub fn chunks_redrawn(
         &self,
         before: &BTreeMap<[i32; 3], Chunk<W>>,
@@ -42,7 +44,8 @@ impl<W: Weight> Grid<W> {
         let fits = (0..3).all(|axis| changed.size()[axis] + 2 * REACH == read.size()[axis] && read.size()[axis] <= 64);
         let (threshold, border) =
             (W::threshold(settings.isovalue), self.border().filter(|border| border.reaches(&read)));
-        if !fits || border.is_some() && W::OUTSIDE.inside(threshold) {
+        let is_extreme = W::OUTSIDE.inside(threshold) || settings.isovalue.abs() > MOST_AT_BORDER;
+        if !fits || border.is_some() && is_extreme {
             return None;
         }
         let shape = Shape::new(read.size()).ok()?;
