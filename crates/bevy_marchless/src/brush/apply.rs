@@ -22,8 +22,9 @@ struct Queued {
     terrain: Entity,
     stamp: marchless::Stamp,
     since: Since,
-    /// For which of the worlds that the terrain was to be; known when its turn has come once.
-    request: Option<u64>,
+    /// For which of the worlds that the terrain was to be, and for the surface at which isovalue; known when its turn has
+    /// come once, so that it makes no difference how long it waits.
+    request: Option<(u64, f32)>,
 }
 
 /// Quantises the update's stamps and queues them.
@@ -75,7 +76,7 @@ pub(super) fn apply_stamps(
             return false;
         };
         let waits = waiting.entry(terrain).or_default();
-        let request = *queued.request.get_or_insert(volume.requests());
+        let (request, isovalue) = *queued.request.get_or_insert((volume.requests(), isovalue));
         if request != volume.requests() {
             return false; // With the source that it was for, all that was dug is gone.
         }
