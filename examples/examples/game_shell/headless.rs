@@ -22,6 +22,7 @@ use crate::game_plugin;
 use crate::layers::MapCamera;
 use crate::level::{Hills, Island, Wall};
 use crate::pick::Picked;
+use crate::save::Saved;
 
 /// One step of `FixedUpdate` an update.
 const UPDATE: Duration = Duration::from_micros(15_625);
@@ -47,6 +48,8 @@ pub(crate) fn run() -> ExitCode {
 struct Player {
     app: App,
     edits: MessageCursor<TerrainEdited>,
+    /// How many chunks the level has at its start.
+    chunks: usize,
     /// What edits have removed in all. [Units: cubic voxels]
     removed: u64,
 }
@@ -61,7 +64,7 @@ impl Player {
             .insert_resource(TimeUpdateStrategy::ManualDuration(UPDATE));
         app.finish();
         app.cleanup();
-        Self { app, edits: MessageCursor::default(), removed: 0 }
+        Self { app, edits: MessageCursor::default(), chunks: 0, removed: 0 }
     }
 
     fn play(&mut self) -> Checked {
@@ -73,6 +76,7 @@ impl Player {
         self.pick()?;
         self.hidden()?;
         self.layers()?;
+        self.saved()?;
         self.leave()?;
 
         self.start()?;
@@ -93,7 +97,8 @@ impl Player {
         })?;
         // Cameras and rays see it from the next update on.
         self.update();
-        println!("The level has {} chunks.", self.count::<Chunk>());
+        self.chunks = self.count::<Chunk>();
+        println!("The level has {} chunks.", self.chunks);
         Ok(())
     }
 
@@ -125,9 +130,9 @@ impl Player {
 
     /// Neither the drill nor stamps from elsewhere do anything in a pause; the stamps do after it.
     fn paused(&mut self) -> Checked {
+        let (before, terrain) = (self.removed, self.only::<Hills>()?);
         self.press(KeyCode::KeyP);
         self.update();
-        let (before, terrain) = (self.removed, self.only::<Hills>()?);
         self.hold(KeyCode::KeyF);
         self.app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::new(20.0, 40.0, 20.0), 12.0)));
         (0..20).for_each(|_| self.update());
@@ -190,6 +195,22 @@ impl Player {
         let mut chunks = world.query::<(&Chunk, Has<NotShadowCaster>)>();
         let is_right = chunks.iter(world).all(|(chunk, casts_none)| casts_none == (chunk.terrain == island));
         ensure(is_right, "chunks do not throw shadows as their terrains say")
+    }
+
+    /// What was saved comes back: the same terrains in the same places, as they were before anybody dug.
+    fn saved(&mut self) -> Checked {
+        self.press(KeyCode::F5);
+        let text = self.app.world().resource::<Saved>().0.clone().ok_or("nothing was saved")?;
+        let former = self.only::<Hills>()?;
+        self.press(KeyCode::F9);
+        self.settle()?;
+        self.update();
+        let hills = self.only::<Hills>()?;
+        ensure(hills != former && self.count::<Terrain>() == 3, "the terrains were not replaced")?;
+        println!("Saved the level in {} bytes, and loaded it: {} chunks.", text.len(), self.count::<Chunk>());
+        ensure(self.count::<Chunk>() == self.chunks, "the level has other chunks than at its start")?;
+        ensure(self.ray_cast()?.terrain == hills, "the wall is not hidden")?;
+        self.layers()
     }
 
     /// The terrains of all chunks that a camera sees.

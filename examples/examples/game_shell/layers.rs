@@ -2,7 +2,6 @@
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::camera::{ScalingMode, Viewport};
-use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use marchless_examples::small::sun;
@@ -26,13 +25,8 @@ pub(crate) fn window_plugin(app: &mut App) {
 }
 
 /// Chunks have the layers of their terrain.
-pub(crate) fn of_hills() -> impl Bundle {
+pub(crate) fn of_hills() -> RenderLayers {
     RenderLayers::from_layers(&[0, ON_MAP])
-}
-
-/// Chunks have what their terrain says of shadows, too.
-pub(crate) fn of_island() -> impl Bundle {
-    (RenderLayers::layer(0), NotShadowCaster)
 }
 
 fn spawn_map_and_sun(mut commands: Commands) {

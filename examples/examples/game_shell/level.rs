@@ -1,6 +1,8 @@
 //! The level: ground, an island that floats above it, and a wall, hidden at first, between the ground and the camera.
 
+use bevy::camera::visibility::RenderLayers;
 use bevy::input::common_conditions::input_just_pressed;
+use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::fly_camera;
@@ -8,17 +10,27 @@ use marchless_examples::camera::fly_camera;
 use crate::layers;
 use crate::shell::Screen;
 
-/// The hills that one digs.
-#[derive(Component)]
+/// The hills that one digs. What scenes do not hold comes with it.
+#[derive(Component, Reflect, Default)]
+#[reflect(Component, Default)]
+#[require(RenderLayers = layers::of_hills(), DespawnOnExit<Screen> = of_level())]
 pub(crate) struct Hills;
 
 /// What floats above them.
-#[derive(Component)]
+#[derive(Component, Reflect, Default)]
+#[reflect(Component, Default)]
+#[require(NotShadowCaster, DespawnOnExit<Screen> = of_level())]
 pub(crate) struct Island;
 
 /// What stands in front of them, if it is shown.
-#[derive(Component)]
+#[derive(Component, Reflect, Default)]
+#[reflect(Component, Default)]
+#[require(DespawnOnExit<Screen> = of_level())]
 pub(crate) struct Wall;
+
+fn of_level() -> DespawnOnExit<Screen> {
+    DespawnOnExit(Screen::Level)
+}
 
 pub(crate) fn plugin(app: &mut App) {
     app.add_systems(Startup, spawn_camera)
@@ -33,7 +45,7 @@ fn spawn_camera(mut commands: Commands) {
 
 fn spawn_level(mut commands: Commands) {
     let hills = Terrain::new(NoiseHeights::from_seed(7)).with_extent(UVec3::new(4, 3, 4));
-    commands.spawn((hills, Hills, layers::of_hills(), DespawnOnExit(Screen::Level)));
+    commands.spawn((hills, Hills));
 
     let island = Sdf::sphere(Vec3::new(32.0, 26.0, 32.0), 20.0)
         .intersection(Sdf::cuboid(Vec3::new(32.0, 10.0, 32.0), Vec3::new(30.0, 10.0, 30.0)))
@@ -42,8 +54,6 @@ fn spawn_level(mut commands: Commands) {
         Terrain::new(island).with_extent(UVec3::new(2, 1, 2)),
         Transform::from_xyz(32.0, 96.0, 24.0),
         Island,
-        layers::of_island(),
-        DespawnOnExit(Screen::Level),
     ));
 
     let wall = Sdf::cuboid(Vec3::new(64.0, 32.0, 16.0), Vec3::new(60.0, 28.0, 4.0)).with_material(5);
@@ -52,7 +62,6 @@ fn spawn_level(mut commands: Commands) {
         Transform::from_xyz(0.0, 60.0, 140.0),
         Visibility::Hidden,
         Wall,
-        DespawnOnExit(Screen::Level),
     ));
 }
 

@@ -3,7 +3,8 @@
 //!
 //! Enter starts the level, Backspace goes back to the menu, and all of the level is gone. In the level: click to grab the
 //! mouse, Esc frees it; W, A, S, D, Space and Shift fly. E digs where Bevy's mesh ray cast hits a chunk, F held drills, H
-//! shows and hides a wall in front of the camera, P pauses, T slows time down.
+//! shows and hides a wall in front of the camera, P pauses, T slows time down; F5 saves the
+//! terrains as a scene, F9 loads them.
 //!
 //! Without a display, or with `--headless`, it presses these keys by itself and checks what comes of it; the exit code is 1
 //! where something is not as it should be.
@@ -13,6 +14,7 @@ mod headless;
 mod layers;
 mod level;
 mod pick;
+mod save;
 mod shell;
 mod text;
 
@@ -66,5 +68,6 @@ fn game_plugin(app: &mut App) {
         layers::plugin,
         pick::plugin,
         dig::plugin,
+        save::plugin,
     ));
 }

@@ -1,6 +1,6 @@
 //! Menu and level, pause and slow motion.
 
-use bevy::app::PostUpdate;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::input::common_conditions::input_just_pressed;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
@@ -29,10 +29,8 @@ const SLOW: f32 = 0.25;
 pub(crate) fn plugin(app: &mut App) {
     app.init_state::<Screen>()
         .add_sub_state::<Pace>()
-        // Stamps are still read, and wait until the game goes on.
-        .configure_sets(PostUpdate, MarchlessSystems::Work.run_if(not(in_state(Pace::Paused))))
-        .add_systems(OnEnter(Pace::Paused), |mut time: ResMut<Time<Virtual>>| time.pause())
-        .add_systems(OnExit(Pace::Paused), |mut time: ResMut<Time<Virtual>>| time.unpause())
+        .add_systems(OnEnter(Pace::Paused), halt)
+        .add_systems(OnExit(Pace::Paused), go_on)
         .add_systems(
             Update,
             (
@@ -58,6 +56,21 @@ fn pause(pace: Option<Res<State<Pace>>>, mut next: ResMut<NextState<Pace>>) {
         Some(Pace::Paused) => next.set(Pace::Running),
         None => {}
     }
+}
+
+/// Time and terrains stand still. Chunks stay drawn, stamps are still read, and wait until the game goes on.
+fn halt(mut time: ResMut<Time<Virtual>>, terrains: Query<Entity, With<Terrain>>, mut commands: Commands) {
+    time.pause();
+    terrains.iter().for_each(|terrain| _ = commands.entity(terrain).try_insert(Disabled));
+}
+
+fn go_on(
+    mut time: ResMut<Time<Virtual>>,
+    terrains: Query<Entity, (With<Terrain>, With<Disabled>)>,
+    mut commands: Commands,
+) {
+    time.unpause();
+    terrains.iter().for_each(|terrain| _ = commands.entity(terrain).try_remove::<Disabled>());
 }
 
 fn slow_down(mut time: ResMut<Time<Virtual>>) {

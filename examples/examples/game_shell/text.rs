@@ -6,7 +6,7 @@ use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};
 use crate::shell::{Pace, Screen};
 
 const KEYS: &str = "Click to look round: WASD Space Shift fly, Esc frees the mouse\n\
-    E digs by mesh ray cast, F drills, H shows or hides the wall\nP pauses, T slows time down, Backspace: menu";
+    E digs by mesh ray cast, F drills, H shows or hides the wall\nP pauses, T slows time down, F5 saves, F9 loads, Backspace: menu";
 
 pub(crate) fn plugin(app: &mut App) {
     app.add_systems(EguiPrimaryContextPass, draw_text);
