@@ -110,31 +110,3 @@ fn a_filter_is_asked_only_about_terrains_near_the_ray() {
     });
     assert_eq!(asked.unwrap(), [near]);
 }
-
-/// Says how long rays take among many terrains: `cargo test --test query_near -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn a_thousand_terrains() {
-    let mut app = app();
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = std::time::Duration::from_millis(50);
-    for index in 0..1_000 {
-        let place = Transform::from_xyz((index % 40) as f32 * 50.0, 0.0, (index / 40) as f32 * 50.0);
-        app.world_mut().spawn((ball(), place));
-    }
-    update_until(&mut app, |app| app.world().resource::<TerrainStats>().meshed >= 8_000);
-    app.update();
-    let ray = |height: f32| Ray3d::new(Vec3::new(16.0, height, -100.0), Dir3::new(Vec3::new(0.3, 0.0, 1.0)).unwrap());
-    let measure = move |terrains: TerrainQuery, all: Query<Entity, With<Terrain>>| {
-        for (rays, ray) in [("over all", ray(100.0)), ("through some", ray(20.0))] {
-            let start = std::time::Instant::now();
-            let hits = (0..1_000).filter(|_| terrains.ray_cast(ray, 3000.0).is_some()).count();
-            let together = start.elapsed() / 1_000;
-            let start = std::time::Instant::now();
-            for _ in 0..1_000 {
-                all.iter().filter_map(|terrain| terrains.ray_cast_terrain(terrain, ray, 3000.0)).for_each(|_| ());
-            }
-            println!("{rays}: {hits} hits; {together:?} a ray, {:?} one by one", start.elapsed() / 1_000);
-        }
-    };
-    app.world_mut().run_system_once(measure).unwrap();
-}

@@ -4,6 +4,7 @@ mod block;
 pub(crate) mod border;
 mod chunk;
 mod chunks;
+mod error;
 pub(crate) mod occupancy;
 mod redrawn;
 mod spare;
@@ -12,12 +13,11 @@ mod tests;
 
 use alloc::collections::BTreeSet;
 
-use thiserror::Error;
-
 pub use self::block::{Block, Neighbourhood, NeighbourhoodView};
 use self::border::Border;
 pub use self::chunk::{BOUND_BOX_CHUNKS, Chunk, ChunkSamples};
 use self::chunks::Chunks;
+pub use self::error::GridError;
 use self::occupancy::Occupancy;
 pub use self::spare::SpareSamples;
 use crate::buffer::MeshBuffer;
@@ -408,49 +408,4 @@ fn check_cells(cells: u32) -> Result<(), GridError> {
     } else {
         Err(GridError::ChunkCells { found: cells })
     }
-}
-
-/// Why a grid or a chunk was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum GridError {
-    /// Chunks cannot have this size.
-    #[error("a chunk has {MIN_CHUNK_CELLS} to {MAX_CHUNK_CELLS} cells per axis, not {found}")]
-    ChunkCells {
-        /// What was given.
-        found: u32,
-    },
-    /// A grid cannot have these bounds.
-    #[error(
-        "a grid's bounds hold at least one chunk and lie within {:?} to {:?}, but {:?} to {:?} was asked for",
-        limits.min, limits.max, bounds.min, bounds.max
-    )]
-    Bounds {
-        /// What was given, in chunks.
-        bounds: Region,
-        /// What can be addressed, in chunks.
-        limits: Region,
-    },
-    /// There is no place for a chunk.
-    #[error("chunk {position:?} lies outside of the grid's chunks, {:?} up to, but without, {:?}", bounds.min, bounds.max)]
-    OutOfBounds {
-        /// The chunk's position.
-        position: [i32; 3],
-        /// The grid's bounds, or what can be addressed, in chunks.
-        bounds: Region,
-    },
-    /// The samples are not those of a chunk.
-    #[error(
-        "a chunk of {cells} cells per axis has {expected} samples, but there are {weights} weights and {materials} materials"
-    )]
-    SamplesLength {
-        /// Cells per axis.
-        cells: u32,
-        /// How many samples that makes.
-        expected: usize,
-        /// How many weights there are.
-        weights: usize,
-        /// How many materials there are.
-        materials: usize,
-    },
 }

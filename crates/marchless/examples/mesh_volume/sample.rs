@@ -141,8 +141,9 @@ fn integer_isovalue<W: Weight>(iso: f64, least: f64, most: f64) -> f32 {
     ((iso - shift) as f32).clamp(floor, ceiling) / W::SCALE
 }
 
-macro_rules! real_sample {
-    ($type:ty) => {
+/// Samples whose difference to the isovalue is what is meshed. `$above`: that difference.
+macro_rules! wide_sample {
+    ($type:ty, $above:ident) => {
         impl Sample for $type {
             type Weight = f32;
 
@@ -152,38 +153,20 @@ macro_rules! real_sample {
 
             fn decode(bytes: &[u8], iso: f64, weights: &mut Vec<f32>) {
                 let (samples, _) = bytes.as_chunks();
-                weights.extend(samples.iter().map(|&sample| above(f64::from(<$type>::from_le_bytes(sample)), iso)));
+                weights.extend(samples.iter().map(|&sample| $above(<$type>::from_le_bytes(sample).into(), iso)));
             }
         }
     };
 }
 
 // An `i32` has more digits than an `f32`, but what is left of it near the isovalue has few.
-real_sample!(i32);
-real_sample!(u32);
-real_sample!(f32);
-real_sample!(f64);
-
-macro_rules! long_sample {
-    ($type:ty) => {
-        impl Sample for $type {
-            type Weight = f32;
-
-            fn isovalue(_iso: f64) -> f32 {
-                0.0
-            }
-
-            fn decode(bytes: &[u8], iso: f64, weights: &mut Vec<f32>) {
-                let (samples, _) = bytes.as_chunks();
-                weights.extend(samples.iter().map(|&sample| above_long(<$type>::from_le_bytes(sample).into(), iso)));
-            }
-        }
-    };
-}
-
+wide_sample!(i32, above);
+wide_sample!(u32, above);
+wide_sample!(f32, above);
+wide_sample!(f64, above);
 // Beyond 2^53, an `f64` does not hold them all.
-long_sample!(i64);
-long_sample!(u64);
+wide_sample!(i64, above_long);
+wide_sample!(u64, above_long);
 
 /// How far the sample lies above the isovalue, rounded such that it is negative exactly where the sample lies below.
 #[inline(always)]
