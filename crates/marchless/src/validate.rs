@@ -7,19 +7,24 @@
 //! samples, mesh ──extraction──▶ which vertex lies on which crossing
 //! ```
 
+mod aabb;
 mod boxes;
+mod coincident;
 mod crossings;
 mod extraction;
 mod links;
-mod places;
+mod order;
 mod predicates;
+mod triangle;
+mod work;
 
-use alloc::vec::Vec;
-use core::fmt;
+use alloc::borrow::Cow;
+use core::{fmt, ops::ControlFlow};
 
+use coincident::Coincident;
 pub use extraction::ExtractionReport;
 use links::Links;
-use places::Places;
+use work::Work;
 
 /// The defects of an indexed triangle mesh, counted, and what kind of surface it is.
 ///
@@ -108,7 +113,7 @@ impl MeshReport {
     /// overlap but those of neighbours. Beyond that, all pairs of triangles whose boxes overlap are compared: the time
     /// grows with their number, the memory does not.
     pub fn new(positions: &[[f32; 3]], indices: &[u32]) -> Self {
-        Self::examine(positions, indices, None)
+        Self::unhurried(positions, indices, None)
     }
 
     /// Examines a mesh whose rims must lie on the faces of the box `[min, max]`; the others are
@@ -117,7 +122,7 @@ impl MeshReport {
     /// A boundary edge lies on a face where both its ends do: one coordinate of both is equal to the box's `min` or
     /// `max`, exactly, and the others are within the box.
     pub fn in_box(positions: &[[f32; 3]], indices: &[u32], bounds: [[f32; 3]; 2]) -> Self {
-        Self::examine(positions, indices, Some(bounds))
+        Self::unhurried(positions, indices, Some(bounds))
     }
 
     /// Whether the surface has no rim. An empty mesh is closed.
@@ -131,36 +136,68 @@ impl MeshReport {
         self.defects().iter().all(|&(count, _, _)| count == 0)
     }
 
-    fn examine(positions: &[[f32; 3]], indices: &[u32], bounds: Option<[[f32; 3]; 2]>) -> Self {
+    /// Examines a mesh as [`new`](Self::new) does, and tells `progress` which share of the work is done, from 0 to 1.
+    ///
+    /// `progress` decides whether to go on; `None` if it has not. It is called on the caller's thread, many times a second:
+    /// print or redraw less often. A few steps take up to a twentieth of the time each.
+    ///
+    /// ```
+    /// use core::ops::ControlFlow;
+    /// use marchless::MeshReport;
+    ///
+    /// let (positions, indices) = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [0, 1, 2]);
+    /// let report = MeshReport::with_progress(&positions, &indices, |done| {
+    ///     assert!((0.0..=1.0).contains(&done));
+    ///     ControlFlow::Continue(())
+    /// });
+    /// assert_eq!(report, Some(MeshReport::new(&positions, &indices)));
+    /// assert_eq!(MeshReport::with_progress(&positions, &indices, |_| ControlFlow::Break(())), None);
+    /// ```
+    pub fn with_progress(
+        positions: &[[f32; 3]],
+        indices: &[u32],
+        mut progress: impl FnMut(f32) -> ControlFlow<()>,
+    ) -> Option<Self> {
+        Self::examine(positions, indices, None, &mut Work::new(threads(indices.len() / 3), &mut progress))
+    }
+
+    /// Examines a mesh without telling anyone how far it is.
+    fn unhurried(positions: &[[f32; 3]], indices: &[u32], bounds: Option<[[f32; 3]; 2]>) -> Self {
+        let mut progress = |_| ControlFlow::Continue(());
+        let mut work = Work::new(threads(indices.len() / 3), &mut progress);
+        Self::examine(positions, indices, bounds, &mut work).unwrap_or_default()
+    }
+
+    fn examine(
+        positions: &[[f32; 3]],
+        indices: &[u32],
+        bounds: Option<[[f32; 3]; 2]>,
+        work: &mut Work<'_>,
+    ) -> Option<Self> {
         // What indices can name.
         let nameable = usize::try_from(1u64 << 32).map_or(positions.len(), |most| positions.len().min(most));
-        let places = Places::of(&positions[..nameable]);
+        let coincident = Coincident::of(&positions[..nameable], 0.05, work)?;
         let mut report = Self {
             vertices: positions.len(),
             triangles: indices.len() / 3,
-            duplicate_vertices: places.repeated,
+            duplicate_vertices: coincident.repeated,
             non_finite_vertices: positions.iter().filter(|&&position| !is_finite(position)).count(),
+            out_of_range_indices: indices.iter().filter(|&&index| index as usize >= nameable).count(),
             stray_indices: indices.len() % 3,
             ..Self::default()
         };
 
         // The triangles that the surface is made of.
-        let mut triangles = Vec::with_capacity(report.triangles);
-        let exists = |index: u32| (index as usize) < nameable;
-        for triangle in indices.chunks_exact(3) {
-            let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
-            if !(exists(a) && exists(b) && exists(c)) {
-                continue;
-            }
-            if a == b || b == c || c == a {
-                report.repeated_index_triangles += 1;
-                continue;
-            }
-            triangles.push([a, b, c]);
+        let mut triangles = Cow::Borrowed(indices.as_chunks().0);
+        let is_repeated = |&[a, b, c]: &[u32; 3]| a == b || b == c || c == a;
+        let exists = |triangle: &[u32; 3]| triangle.iter().all(|&index| (index as usize) < nameable);
+        if report.out_of_range_indices > 0 || triangles.iter().any(is_repeated) {
+            triangles.to_mut().retain(exists);
+            report.repeated_index_triangles = triangles.iter().filter(|&triangle| is_repeated(triangle)).count();
+            triangles.to_mut().retain(|triangle| !is_repeated(triangle));
         }
-        report.out_of_range_indices = indices.iter().filter(|&&index| !exists(index)).count();
 
-        let links = Links::of(&triangles, nameable);
+        let links = Links::of(&triangles, nameable, 0.2, work)?;
         report.boundary_edges = links.boundary.len();
         report.cracks = bounds.map_or(0, |bounds| {
             let is_crack = |edge: &&[u32; 2]| !is_on_face(edge.map(|end| positions[end as usize]), bounds);
@@ -175,9 +212,10 @@ impl MeshReport {
         report.euler = links.used_vertices as i64 - links.edges as i64 + triangles.len() as i64;
         report.genus = links.genus(report.euler);
 
-        let (zero_area, crossing) = crossings::count(positions, triangles, &places, links.duplicate_triangles > 0);
-        (report.zero_area_triangles, report.crossing_triangles) = (zero_area, crossing);
-        report
+        let mesh = crossings::Mesh { positions, triangles: &triangles, coincident: &coincident };
+        (report.zero_area_triangles, report.crossing_triangles) =
+            crossings::count(&mesh, links.duplicate_triangles > 0, 0.75, work)?;
+        Some(report)
     }
 
     /// Every kind of defect: how many, and the word for one and for several.
@@ -223,6 +261,23 @@ impl fmt::Display for MeshReport {
         self.genus.map_or(Ok(()), |genus| write!(f, ", genus {genus}"))
     }
 }
+
+/// How many threads examine a mesh: those that the system offers, but one for every [`PER_THREAD`] triangles.
+#[cfg(feature = "std")]
+fn threads(triangles: usize) -> usize {
+    let useful = triangles / PER_THREAD;
+    // The question takes longer than a small mesh.
+    if useful < 2 { 1 } else { std::thread::available_parallelism().map_or(1, |offered| offered.get().min(useful)) }
+}
+
+#[cfg(not(feature = "std"))]
+const fn threads(_triangles: usize) -> usize {
+    1
+}
+
+/// Triangles for which another thread pays.
+#[cfg(feature = "std")]
+const PER_THREAD: usize = 1 << 15;
 
 fn is_finite(position: [f32; 3]) -> bool {
     position.iter().all(|coordinate| coordinate.is_finite())

@@ -1,193 +1,124 @@
-//! [`BoxTree`]: finds all pairs of boxes that meet.
+//! [`BoxTree`]: the triangles' bounding boxes, in leaves of 16, and which leaves may overlap.
 //!
-//! Each node of the tree parts its boxes along the axis on which their middles are spread the most: in the middle, or by
-//! their number where almost all of them would come to lie on one side. So the tree is not much deeper for a heap in one
-//! spot, or with a single box far out, than for an even surface, and its size is that of the mesh.
+//! Leaves are consecutive triangles in an order in which those are close to each other. Above them stands a binary tree
+//! of boxes that halves the number of leaves, so that its depth is the same for any mesh. A leaf's boxes are kept by
+//! coordinates: one box is compared with all 16 at once, without a branch.
 //!
-//! Refused: a uniform grid, which has everything in one of its cells where one vertex lies at 10³⁰, and needs much memory
-//! or a second structure where one triangle is as large as all the others together; a sweep along one axis, of which a
-//! plane across it is the worst case.
+//! Refused: a uniform grid, which has everything in one of its cells if one vertex lies at 10³⁰, and needs a second
+//! structure if one triangle is as large as all others together; a sweep along one axis, whose worst case is a plane
+//! across that axis.
 
 use alloc::{vec, vec::Vec};
-use core::ops::ControlFlow;
+use core::ops::Range;
+
+use super::aabb::Aabb;
 
 /// Boxes in a leaf, at most.
-const LEAF: usize = 6;
+pub(super) const LEAF: usize = 16;
 
-/// An axis-aligned box; its faces belong to it.
-#[derive(Clone, Copy)]
-pub(super) struct Bounds {
-    pub(super) min: [f32; 3],
-    pub(super) max: [f32; 3],
+/// Up to [`LEAF`] bounding boxes, by coordinates, and the box around them.
+pub(super) struct Leaf {
+    pub(super) aabb: Aabb,
+    min: [[f32; LEAF]; 3],
+    max: [[f32; LEAF]; 3],
 }
 
-impl Bounds {
-    /// Holds nothing.
-    const NONE: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
-
-    pub(super) fn of(corners: &[[f32; 3]; 3]) -> Self {
-        corners.iter().fold(Self::NONE, |bounds, &corner| bounds.with(&Self { min: corner, max: corner }))
-    }
-
-    #[inline(always)]
-    fn with(&self, other: &Self) -> Self {
-        let least = |a: f32, b: f32| if a < b { a } else { b };
-        let most = |a: f32, b: f32| if a > b { a } else { b };
-        Self {
-            min: [0, 1, 2].map(|axis| least(self.min[axis], other.min[axis])),
-            max: [0, 1, 2].map(|axis| most(self.max[axis], other.max[axis])),
-        }
-    }
-
-    #[inline(always)]
-    fn meets(&self, other: &Self) -> bool {
-        let [low, high] = [(self, other), (other, self)]
-            .map(|(a, b)| (a.min[0] <= b.max[0]) & (a.min[1] <= b.max[1]) & (a.min[2] <= b.max[2]));
-        low & high
-    }
-
-    /// The longest side. Does not overflow.
-    pub(super) fn size(&self) -> f64 {
-        (0..3).map(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis])).fold(0.0, f64::max)
-    }
-}
-
-/// Boxes, sorted by where they lie.
-pub(super) struct BoxTree {
-    boxes: Vec<Bounds>,
-    /// A node, then all nodes of its first part, then those of its second part.
-    nodes: Vec<Node>,
-}
-
-/// Boxes next to each other in the list, and a box around them.
-struct Node {
-    bounds: Bounds,
-    first: u32,
-    len: u32,
-    /// The node of the second part; that of the first is the next one. 0 where there are no parts.
-    second: u32,
-}
-
-/// What the boxes are sorted by.
-struct Middle {
-    at: [f32; 3],
-    index: u32,
-}
-
-impl BoxTree {
-    /// Sorts boxes, and says in which order they are now: the former index of each.
-    ///
-    /// `boxes`: finite, fewer than 2³¹ of them.
-    pub(super) fn of(boxes: &[Bounds]) -> (Self, impl Iterator<Item = usize>) {
-        let middle = |bounds: &Bounds| [0, 1, 2].map(|axis| bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5);
-        let mut middles: Vec<Middle> =
-            boxes.iter().zip(0..).map(|(bounds, index)| Middle { at: middle(bounds), index }).collect();
-        let mut tree = Self { boxes: vec![], nodes: Vec::with_capacity(boxes.len()) };
-        if !middles.is_empty() {
-            tree.grow(boxes, &mut middles);
-        }
-        tree.nodes.shrink_to_fit();
-        (tree, middles.into_iter().map(|middle| middle.index as usize))
-    }
-
-    /// Adds a node for boxes that come next, and puts them into order.
-    fn grow(&mut self, boxes: &[Bounds], middles: &mut [Middle]) -> Bounds {
-        let node = self.nodes.len();
-        let (first, len) = (self.boxes.len() as u32, middles.len() as u32);
-        self.nodes.push(Node { bounds: Bounds::NONE, first, len, second: 0 });
-        let bounds = if middles.len() <= LEAF {
-            self.boxes.extend(middles.iter().map(|middle| boxes[middle.index as usize]));
-            self.boxes[first as usize..].iter().fold(Bounds::NONE, |bounds, other| bounds.with(other))
-        } else {
-            let border = parted(middles);
-            let (low, high) = middles.split_at_mut(border);
-            let bounds = self.grow(boxes, low);
-            self.nodes[node].second = self.nodes.len() as u32;
-            bounds.with(&self.grow(boxes, high))
-        };
-        self.nodes[node].bounds = bounds;
-        bounds
-    }
-
-    /// Calls `visit` with all pairs of boxes that meet, each once, as long as it goes on.
-    pub(super) fn visit_pairs(&self, visit: &mut impl FnMut(usize, usize) -> ControlFlow<()>) -> ControlFlow<()> {
-        if self.nodes.is_empty() { ControlFlow::Continue(()) } else { self.within(0, visit) }
-    }
-
-    /// The pairs of a node's boxes.
-    fn within(&self, node: usize, visit: &mut impl FnMut(usize, usize) -> ControlFlow<()>) -> ControlFlow<()> {
-        let Node { second, .. } = self.nodes[node];
-        if second == 0 {
-            let boxes = self.nodes[node].boxes();
-            return boxes.clone().try_for_each(|a| self.visit_meeting(a, a + 1..boxes.end, visit));
-        }
-        self.within(node + 1, visit)?;
-        self.within(second as usize, visit)?;
-        self.between(node + 1, second as usize, visit)
-    }
-
-    /// The pairs of a box of one node and one of the other.
-    fn between(&self, a: usize, b: usize, visit: &mut impl FnMut(usize, usize) -> ControlFlow<()>) -> ControlFlow<()> {
-        let (node_a, node_b) = (&self.nodes[a], &self.nodes[b]);
-        if !node_a.bounds.meets(&node_b.bounds) {
-            return ControlFlow::Continue(());
-        }
-        if node_a.second == 0 && node_b.second == 0 {
-            return node_a
-                .boxes()
-                .filter(|&a| self.boxes[a].meets(&node_b.bounds))
-                .try_for_each(|a| self.visit_meeting(a, node_b.boxes(), visit));
-        }
-        // The larger one is parted; a leaf cannot be.
-        if node_b.second == 0 || (node_a.second != 0 && node_a.len >= node_b.len) {
-            self.between(a + 1, b, visit)?;
-            self.between(node_a.second as usize, b, visit)
-        } else {
-            self.between(a, b + 1, visit)?;
-            self.between(a, node_b.second as usize, visit)
-        }
-    }
-
-    #[inline(always)]
-    fn visit_meeting(
-        &self,
-        a: usize,
-        others: core::ops::Range<usize>,
-        visit: &mut impl FnMut(usize, usize) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let bounds = &self.boxes[a];
-        for (b, other) in others.clone().zip(&self.boxes[others]) {
-            if bounds.meets(other) {
-                visit(a, b)?;
+impl Leaf {
+    pub(super) fn of(boxes: impl IntoIterator<Item = Aabb>) -> Self {
+        let mut leaf = Self { aabb: Aabb::EMPTY, min: [[f32::INFINITY; LEAF]; 3], max: [[f32::NEG_INFINITY; LEAF]; 3] };
+        for (lane, aabb) in boxes.into_iter().take(LEAF).enumerate() {
+            leaf.aabb = leaf.aabb.union(&aabb);
+            for axis in 0..3 {
+                (leaf.min[axis][lane], leaf.max[axis][lane]) = (aabb.min[axis], aabb.max[axis]);
             }
         }
-        ControlFlow::Continue(())
+        leaf
+    }
+
+    /// One of the boxes.
+    #[inline(always)]
+    pub(super) fn get(&self, lane: usize) -> Aabb {
+        Aabb { min: [0, 1, 2].map(|axis| self.min[axis][lane]), max: [0, 1, 2].map(|axis| self.max[axis][lane]) }
+    }
+
+    /// Which boxes overlap another box, a bit each.
+    // Compiled by itself, all lanes are compared at once.
+    #[inline(never)]
+    pub(super) fn overlapping(&self, other: &Aabb) -> u32 {
+        let mut bits = 0;
+        for lane in 0..LEAF {
+            let below = |axis: usize| self.min[axis][lane] <= other.max[axis];
+            let above = |axis: usize| self.max[axis][lane] >= other.min[axis];
+            let overlaps = below(0) & above(0) & below(1) & above(1) & below(2) & above(2);
+            bits |= u32::from(overlaps) << lane;
+        }
+        bits
     }
 }
 
-impl Node {
-    fn boxes(&self) -> core::ops::Range<usize> {
-        self.first as usize..(self.first + self.len) as usize
-    }
+/// A binary tree over leaves.
+pub(super) struct BoxTree {
+    /// Each node, then all nodes of its first half, then those of its second half.
+    nodes: Vec<Node>,
+    /// The node of each leaf.
+    node_of: Vec<u32>,
 }
 
-/// Parts the middles, and says how many are in the first part: neither none nor all.
-fn parted(middles: &mut [Middle]) -> usize {
-    let spread =
-        middles.iter().fold(Bounds::NONE, |spread, middle| spread.with(&Bounds { min: middle.at, max: middle.at }));
-    let extent = |axis: usize| spread.max[axis] - spread.min[axis];
-    let axis = (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).unwrap_or(0);
-    let border = spread.min[axis] * 0.5 + spread.max[axis] * 0.5;
-    let mut low = 0;
-    for at in 0..middles.len() {
-        // Without a branch that nobody could predict.
-        let is_low = middles[at].at[axis] < border;
-        middles.swap(low, at);
-        low += usize::from(is_low);
+/// The box around some consecutive leaves.
+struct Node {
+    aabb: Aabb,
+    /// The first node that is not below this one.
+    next: u32,
+    /// The leaf, or [`INNER`].
+    leaf: u32,
+}
+
+/// Instead of a leaf.
+const INNER: u32 = u32::MAX;
+
+impl BoxTree {
+    /// `leaves`: the boxes around them; fewer than 2²⁸.
+    pub(super) fn of(leaves: &[Aabb]) -> Self {
+        let mut tree = Self { nodes: Vec::with_capacity(leaves.len() * 2), node_of: vec![0; leaves.len()] };
+        if !leaves.is_empty() {
+            tree.add(leaves, 0..leaves.len());
+        }
+        tree
     }
-    if low.min(middles.len() - low) * 8 < middles.len() {
-        low = middles.len() / 2;
-        middles.select_nth_unstable_by(low, |a, b| a.at[axis].total_cmp(&b.at[axis]));
+
+    fn add(&mut self, leaves: &[Aabb], range: Range<usize>) -> Aabb {
+        let node = self.nodes.len();
+        let (start, len) = (range.start, range.len());
+        let mut aabb = leaves[start];
+        let next = (node + 2 * len - 1) as u32;
+        let leaf = if len == 1 { start as u32 } else { INNER };
+        self.nodes.push(Node { aabb, next, leaf });
+        if len == 1 {
+            self.node_of[start] = node as u32;
+        } else {
+            let middle = start + len / 2;
+            aabb = self.add(leaves, start..middle);
+            aabb = aabb.union(&self.add(leaves, middle..range.end));
+            self.nodes[node].aabb = aabb;
+        }
+        aabb
     }
-    low
+
+    /// The leaves after `leaf` whose boxes overlap `aabb`.
+    pub(super) fn later(&self, leaf: usize, aabb: &Aabb) -> impl Iterator<Item = usize> {
+        let mut at = self.node_of[leaf] as usize + 1;
+        core::iter::from_fn(move || {
+            while let Some(node) = self.nodes.get(at) {
+                if !node.aabb.overlaps(aabb) {
+                    at = node.next as usize;
+                    continue;
+                }
+                at += 1;
+                if node.leaf != INNER {
+                    return Some(node.leaf as usize);
+                }
+            }
+            None
+        })
+    }
 }

@@ -1,159 +1,187 @@
-//! Triangles that cross each other: a tree of boxes finds pairs, planes rule most of them out, exact predicates judge
-//! the rest.
+//! Triangles that cross each other: bounding boxes find pairs, planes and projections rule most of them out in `f64`
+//! with error bounds, exact predicates judge the rest.
 
 use alloc::vec::Vec;
-use core::ops::ControlFlow;
+use core::ops::Range;
 
 use super::{
     MeshReport,
-    boxes::{Bounds, BoxTree},
+    aabb::Aabb,
+    boxes::{BoxTree, LEAF, Leaf},
+    coincident::Coincident,
     is_finite,
-    places::Places,
-    predicates::{Corners, cross, has_no_area},
+    order::{self, Item},
+    predicates::{Corners, has_no_area},
+    triangle::Triangle,
+    work::Work,
 };
 
-/// How many of the triangles have no area, and how many pairs of the others cross.
+/// Triangles that are prepared as one part.
+const BLOCK: usize = LEAF << BLOCK_BITS;
+/// The number of a block's leaves, as bits.
+const BLOCK_BITS: usize = 12;
+/// Leaves that are compared with later ones as one part.
+const STEP: usize = 128;
+
+/// The triangles that can cross others, as a caller of [`count`] gives them.
+pub(super) struct Mesh<'a> {
+    pub(super) positions: &'a [[f32; 3]],
+    /// Three different vertices each.
+    pub(super) triangles: &'a [[u32; 3]],
+    pub(super) coincident: &'a Coincident,
+}
+
+/// How many triangles have zero area, and how many pairs of the others cross; `None` if the caller cancels.
 ///
-/// `duplicates`: whether there are any.
-pub(super) fn count(
-    positions: &[[f32; 3]],
-    mut triangles: Vec<[u32; 3]>,
-    places: &Places,
-    duplicates: bool,
-) -> (usize, usize) {
-    let corners = |triangle: &[u32; 3]| triangle.map(|vertex| positions[vertex as usize]);
-    let mut flat = 0;
-    triangles.retain(|triangle| {
-        let corners = corners(triangle);
-        let finite = corners.iter().all(|&corner| is_finite(corner));
-        let no_area = finite && has_no_area(&corners);
-        flat += usize::from(no_area);
-        finite && !no_area
-    });
-    if duplicates {
-        triangles.iter_mut().for_each(|triangle| triangle.sort_unstable());
-        triangles.sort_unstable();
-        triangles.dedup();
+/// `has_duplicates`: whether some triangles have the same vertices.
+pub(super) fn count(mesh: &Mesh<'_>, has_duplicates: bool, share: f32, work: &mut Work<'_>) -> Option<(usize, usize)> {
+    let (items, zero_area) = mesh.solid(share * 0.1, work)?;
+    if !has_duplicates {
+        return Some((zero_area, mesh.crossings(items, share * 0.9, work)?));
     }
-    triangles.truncate(i32::MAX as usize);
-
-    let boxes: Vec<Bounds> = triangles.iter().map(|triangle| Bounds::of(&corners(triangle))).collect();
-    let (tree, order) = BoxTree::of(&boxes);
-    let triangles: Vec<Triangle> = order
-        .map(|index| {
-            let vertices = triangles[index];
-            Triangle::new(corners(&vertices), vertices.map(|vertex| places.first(vertex)), &boxes[index])
-        })
-        .collect();
-    drop(boxes);
-    let mut found = 0;
-    let _ = tree.visit_pairs(&mut |a, b| {
-        found += usize::from(triangles[a].crosses(&triangles[b]));
-        if found < MeshReport::MOST_CROSSINGS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-    });
-    (flat, found)
+    let mut distinct = mesh.triangles.to_vec();
+    distinct.iter_mut().for_each(|triangle| triangle.sort_unstable());
+    distinct.sort_unstable();
+    distinct.dedup();
+    let mesh = Mesh { triangles: &distinct, ..*mesh };
+    let (items, _) = mesh.solid(share * 0.1, work)?;
+    Some((zero_area, mesh.crossings(items, share * 0.8, work)?))
 }
 
-/// A triangle with an area, and what rules out most crossings with others.
-struct Triangle {
-    corners: Corners,
-    /// The same numbers for the same places.
-    vertices: [u32; 3],
-    /// Across the plane, about as long as twice the area.
-    normal: [f64; 3],
-    /// Times the size of a box around a point and the triangle: what the product of the normal and the point's
-    /// distance from the first corner must exceed, so that rounding cannot have changed its sign.
-    doubt: f64,
-    /// Of the box around it.
-    size: f64,
-}
-
-impl Triangle {
-    fn new(corners: Corners, vertices: [u32; 3], bounds: &Bounds) -> Self {
-        let [u, v] = [corners[1], corners[2]].map(|corner| from(corners[0], corner));
-        let normal = [0, 1, 2].map(|axis| {
-            let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-            u[i] * v[j] - u[j] * v[i]
-        });
-        // Shewchuk's bound for the product is 7.1 times 2⁻⁵³ times six products of three lengths, none of which is longer
-        // than the box that they are in.
-        let [u, v] = [u, v].map(|side| side.iter().fold(0.0, |longest: f64, length| longest.max(length.abs())));
-        const DOUBT: f64 = 64.0 / (1u64 << 53) as f64;
-        Self { corners, vertices, normal, doubt: DOUBT * u * v, size: bounds.size() }
+impl Mesh<'_> {
+    fn corners(&self, triangle: [u32; 3]) -> Corners {
+        triangle.map(|vertex| self.positions[vertex as usize])
     }
 
-    /// Whether two triangles whose boxes meet have a point in common other than common corners and sides.
-    #[inline(always)]
-    fn crosses(&self, other: &Self) -> bool {
-        // The corners that both have in common, a bit each.
-        let (mut of_self, mut of_other) = (0u32, 0u32);
-        for (i, a) in self.vertices.iter().enumerate() {
-            for (j, b) in other.vertices.iter().enumerate() {
-                let same = u32::from(a == b);
-                of_self |= same << i;
-                of_other |= same << j;
+    /// The middles of the triangles with an area, at most 2³¹ of them, and how many triangles have none. Both leave out
+    /// triangles with a corner that is not finite.
+    fn solid(&self, share: f32, work: &mut Work<'_>) -> Option<(Vec<Item>, usize)> {
+        let solid = |block: usize| {
+            let (mut items, mut zero_area) = (Vec::with_capacity(BLOCK), 0);
+            let start = block * BLOCK;
+            let end = self.triangles.len().min(start + BLOCK);
+            for (&triangle, index) in self.triangles[start..end].iter().zip(start..) {
+                let corners = self.corners(triangle);
+                if !corners.into_iter().all(is_finite) {
+                    continue;
+                }
+                if has_no_area(&corners) {
+                    zero_area += 1;
+                } else {
+                    items.push(Item { point: Aabb::around(corners).middle(), index: index as u32 });
+                }
+            }
+            (items, zero_area)
+        };
+        let blocks = work.map(share, 0..self.triangles.len().div_ceil(BLOCK), solid)?;
+        let zero_area = blocks.iter().map(|(_, zero_area)| zero_area).sum();
+        let mut items = Vec::with_capacity(blocks.iter().map(|(items, _)| items.len()).sum());
+        for (block, _) in blocks {
+            items.extend_from_slice(&block);
+        }
+        items.truncate(i32::MAX as usize);
+        Some((items, zero_area))
+    }
+
+    /// How many pairs of triangles cross. `items`: the middles of those that count.
+    fn crossings(&self, items: Vec<Item>, share: f32, work: &mut Work<'_>) -> Option<usize> {
+        let items = order::spatial(items, share * 0.2, work)?;
+        let blocks = items.chunks(BLOCK);
+        let blocks = work.map(share * 0.2, blocks, |items| Block::of(self, items))?;
+        drop(items);
+        let leaves: Vec<Aabb> = blocks.iter().flat_map(|block| block.leaves.iter().map(|leaf| leaf.aabb)).collect();
+        let pairs = Pairs { blocks, tree: BoxTree::of(&leaves) };
+        let steps = leaves.len().div_ceil(STEP);
+        let step = |step: usize| pairs.crossing(step * STEP..leaves.len().min((step + 1) * STEP));
+        let mut sum = 0;
+        let counts = work.map_while(share * 0.6, 0..steps, step, |count| {
+            sum += count;
+            sum < MeshReport::MOST_CROSSINGS
+        })?;
+        Some(counts.iter().sum::<usize>().min(MeshReport::MOST_CROSSINGS))
+    }
+}
+
+/// Some triangles that are close to each other, in leaves.
+struct Block {
+    leaves: Vec<Leaf>,
+    triangles: Vec<Triangle>,
+}
+
+impl Block {
+    fn of(mesh: &Mesh<'_>, items: &[Item]) -> Self {
+        let mut block =
+            Self { leaves: Vec::with_capacity(items.len().div_ceil(LEAF)), triangles: Vec::with_capacity(items.len()) };
+        for items in items.chunks(LEAF) {
+            block.leaves.push(Leaf::of(items.iter().map(|item| {
+                let vertices = mesh.triangles[item.index as usize];
+                let corners = mesh.corners(vertices);
+                let aabb = Aabb::around(corners);
+                let vertices = vertices.map(|vertex| mesh.coincident.first(vertex));
+                block.triangles.push(Triangle::new(corners, vertices, &aabb));
+                aabb
+            })));
+        }
+        block
+    }
+}
+
+/// Finds pairs of triangles.
+struct Pairs {
+    blocks: Vec<Block>,
+    tree: BoxTree,
+}
+
+impl Pairs {
+    /// How many pairs cross whose first triangle is in one of these leaves; it counts no further than
+    /// [`MeshReport::MOST_CROSSINGS`] and some.
+    fn crossing(&self, leaves: Range<usize>) -> usize {
+        let mut found = 0;
+        for first in leaves {
+            let (leaf, triangles) = self.leaf(first);
+            for (lane, triangle) in triangles.iter().enumerate() {
+                let later = !1 << lane;
+                found += crossing(triangle, triangles, leaf.overlapping(&leaf.get(lane)) & later);
+            }
+            for second in self.tree.later(first, &leaf.aabb) {
+                let (other, others) = self.leaf(second);
+                let near = other.overlapping(&leaf.aabb);
+                if near == 0 {
+                    continue;
+                }
+                for lane in lanes(leaf.overlapping(&other.aabb)) {
+                    found += crossing(&triangles[lane], others, other.overlapping(&leaf.get(lane)) & near);
+                }
+                if found >= MeshReport::MOST_CROSSINGS {
+                    return found;
+                }
             }
         }
-        if of_self == 7 {
-            return true;
-        }
-        let (other_above, other_below) = self.sides(other);
-        if (other_above | of_other == 7) | (other_below | of_other == 7) {
-            return false;
-        }
-        let (self_above, self_below) = other.sides(self);
-        if (self_above | of_self == 7) | (self_below | of_self == 7) {
-            return false;
-        }
-        let all_clear = (other_above | other_below | of_other == 7) & (self_above | self_below | of_self == 7);
-        if all_clear && of_self.is_power_of_two() {
-            // As in `predicates`: where each parts the other, both go on in a common direction or they do not.
-            return is_next_set(of_self, self_above) != is_next_set(of_other, other_above);
-        }
-        self.crosses_exactly(other)
+        found
     }
 
-    /// Which corners of the other one are clearly above the plane, and which below; a bit each.
+    /// A leaf and its triangles.
     #[inline(always)]
-    fn sides(&self, other: &Self) -> (u32, u32) {
-        let doubt = self.doubt * (self.size + other.size);
-        let (mut above, mut below) = (0, 0);
-        for (i, &corner) in other.corners.iter().enumerate() {
-            let [x, y, z] = from(self.corners[0], corner);
-            let height = x * self.normal[0] + y * self.normal[1] + z * self.normal[2];
-            above |= u32::from(height > doubt) << i;
-            below |= u32::from(height < -doubt) << i;
-        }
-        (above, below)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn crosses_exactly(&self, other: &Self) -> bool {
-        // What they have in common comes first in both.
-        let (mut a, mut b) = ((self.corners, self.vertices), (other.corners, other.vertices));
-        let mut common = 0;
-        for i in 0..3 {
-            if let Some(j) = (common..3).find(|&j| b.1[j] == a.1[i]) {
-                a.0.swap(common, i);
-                a.1.swap(common, i);
-                b.0.swap(common, j);
-                b.1.swap(common, j);
-                common += 1;
-            }
-        }
-        cross(&a.0, &b.0, common)
+    fn leaf(&self, leaf: usize) -> (&Leaf, &[Triangle]) {
+        let (block, leaf) = (&self.blocks[leaf >> BLOCK_BITS], leaf & ((1 << BLOCK_BITS) - 1));
+        let end = block.triangles.len().min((leaf + 1) * LEAF);
+        (&block.leaves[leaf], &block.triangles[leaf * LEAF..end])
     }
 }
 
-/// Whether a bit is set for the corner after the one whose bit is `corner`.
+/// How many of some triangles, a bit each, cross another one.
 #[inline(always)]
-const fn is_next_set(corner: u32, bits: u32) -> bool {
-    (bits | bits << 3) & corner << 1 != 0
+fn crossing(triangle: &Triangle, others: &[Triangle], bits: u32) -> usize {
+    lanes(bits).filter(|&lane| triangle.crosses(&others[lane])).count()
 }
 
-/// From one point to another, in `f64`, where it does not overflow.
+/// The numbers of the bits that are set.
 #[inline(always)]
-fn from(start: [f32; 3], end: [f32; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|axis| f64::from(end[axis]) - f64::from(start[axis]))
+fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let lane = bits.trailing_zeros();
+        let is_set = bits != 0;
+        bits &= bits.wrapping_sub(1);
+        is_set.then_some(lane as usize)
+    })
 }

@@ -6,8 +6,11 @@
 //! comparisons. Only what is no ring is sorted.
 
 use alloc::{vec, vec::Vec};
+use core::ops::Range;
 
-/// What the indices say of a surface.
+use super::work::Work;
+
+/// What the indices alone say about a surface.
 #[derive(Default)]
 pub(super) struct Links {
     /// The edges of one triangle only, as it runs along them.
@@ -25,13 +28,28 @@ pub(super) struct Links {
 type Segment = [u32; 2];
 
 impl Links {
-    /// `triangles`: three different ones of `vertices` vertices each.
-    pub(super) fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
+    /// `triangles`: three different ones of `vertices` vertices each. `None` if the caller cancels.
+    pub(super) fn of(triangles: &[[u32; 3]], vertices: usize, share: f32, work: &mut Work<'_>) -> Option<Self> {
+        // The last part joins vertices to components; each of the others judges the vertices of a range.
+        let ranges = work.threads();
+        let start_of = |range: usize| (vertices as u64 * range as u64 / ranges as u64) as usize;
+        let mut parts = work.map(share, 0..ranges + 1, |part| match part {
+            part if part == ranges => Self { components: joins(triangles, vertices), ..Self::default() },
+            range => Self::around(start_of(range)..start_of(range + 1), triangles),
+        })?;
+        let joins = parts.pop().map_or(0, |part| part.components);
+        let mut links = parts.into_iter().reduce(Self::plus).unwrap_or_default();
+        links.components = links.used_vertices - joins;
+        Some(links)
+    }
+
+    /// What the links of some vertices show. The components are left out.
+    fn around(vertices: Range<usize>, triangles: &[[u32; 3]]) -> Self {
         let mut links = Self::default();
         let mut scratch = Scratch::default();
-        let (mut segments, ends) = gathered(triangles, vertices);
+        let (mut segments, ends) = gathered(triangles, vertices.clone());
         let mut start = 0;
-        for (vertex, end) in ends.into_iter().enumerate() {
+        for (vertex, end) in vertices.zip(ends) {
             let link = &mut segments[start..end];
             start = end;
             if link.is_empty() {
@@ -44,8 +62,22 @@ impl Links {
                 links.add(vertex as u32, link, &mut scratch);
             }
         }
-        links.components = links.used_vertices - joins(triangles, vertices);
         links
+    }
+
+    /// The sums of both.
+    fn plus(mut self, other: Self) -> Self {
+        self.boundary.extend_from_slice(&other.boundary);
+        Self {
+            boundary: self.boundary,
+            edges: self.edges + other.edges,
+            non_manifold_edges: self.non_manifold_edges + other.non_manifold_edges,
+            non_manifold_vertices: self.non_manifold_vertices + other.non_manifold_vertices,
+            inconsistent_edges: self.inconsistent_edges + other.inconsistent_edges,
+            duplicate_triangles: self.duplicate_triangles + other.duplicate_triangles,
+            used_vertices: self.used_vertices + other.used_vertices,
+            components: self.components + other.components,
+        }
     }
 
     /// How many handles there are, where that makes sense: 2·components − 2·genus − rims is the Euler characteristic.
@@ -79,13 +111,13 @@ impl Links {
     fn add(&mut self, vertex: u32, link: &[Segment], scratch: &mut Scratch) {
         let Scratch { ends, fans, triangles } = scratch;
         ends.clear();
-        for (segment, &[next, previous]) in link.iter().enumerate() {
+        for (segment, &[next, previous]) in (0..).zip(link) {
             ends.push(End { neighbour: next, segment, leaves: true });
             ends.push(End { neighbour: previous, segment, leaves: false });
         }
         ends.sort_unstable_by_key(|end| end.neighbour);
         fans.clear();
-        fans.extend(0..link.len());
+        fans.extend(0..link.len() as u32);
         let (mut fan_count, mut crowded) = (link.len(), false);
         for edge in ends.chunk_by(|a, b| a.neighbour == b.neighbour) {
             for pair in edge.windows(2) {
@@ -119,35 +151,39 @@ impl Links {
 struct Scratch {
     ends: Vec<End>,
     /// Disjoint sets of the segments that belong to one fan.
-    fans: Vec<usize>,
+    fans: Vec<u32>,
     triangles: Vec<Segment>,
 }
 
 /// An end of a segment: an edge from the vertex to a neighbour, as one triangle has it.
 struct End {
     neighbour: u32,
-    segment: usize,
+    segment: u32,
     /// Whether the triangle runs from the vertex to the neighbour.
     leaves: bool,
 }
 
-/// The links of all vertices, one after the other, and where each ends.
-fn gathered(triangles: &[[u32; 3]], vertices: usize) -> (Vec<Segment>, Vec<usize>) {
-    let mut ends = vec![0usize; vertices];
+/// The links of some vertices, one after the other, and where each ends.
+fn gathered(triangles: &[[u32; 3]], vertices: Range<usize>) -> (Vec<Segment>, Vec<usize>) {
+    let local = |vertex: u32| (vertex as usize).wrapping_sub(vertices.start);
+    let mut ends = vec![0usize; vertices.len()];
     for &corner in triangles.as_flattened() {
-        ends[corner as usize] += 1;
+        if let Some(end) = ends.get_mut(local(corner)) {
+            *end += 1;
+        }
     }
     let mut sum = 0;
     for end in &mut ends {
-        // For now, where each starts.
+        // The start, until the link is filled.
         (*end, sum) = (sum, sum + *end);
     }
     let mut segments = vec![[0; 2]; sum];
     for &[a, b, c] in triangles {
         for (corner, segment) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
-            let end = &mut ends[corner as usize];
-            segments[*end] = segment;
-            *end += 1;
+            if let Some(end) = ends.get_mut(local(corner)) {
+                segments[*end] = segment;
+                *end += 1;
+            }
         }
     }
     (segments, ends)
@@ -173,12 +209,11 @@ fn is_ring(link: &mut [Segment]) -> bool {
     end == link[0][0]
 }
 
-/// How many times two sets become one where all the vertices of each triangle are joined.
+/// How many times two sets become one when the vertices of each triangle are joined.
 fn joins(triangles: &[[u32; 3]], vertices: usize) -> usize {
-    let mut sets: Vec<usize> = (0..vertices).collect();
+    let mut sets: Vec<u32> = (0..vertices).map(|vertex| vertex as u32).collect();
     let mut joined = 0;
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| vertex as usize);
+    for &[a, b, c] in triangles {
         joined += usize::from(join(&mut sets, a, b)) + usize::from(join(&mut sets, b, c));
     }
     joined
@@ -187,17 +222,21 @@ fn joins(triangles: &[[u32; 3]], vertices: usize) -> usize {
 /// Makes one set of those of `a` and `b`, and says whether they were two. `sets`: what is above each item in its set's
 /// tree; itself where it is the top. The higher number always goes below the lower one: with the halving of paths that
 /// is O(log n).
-fn join(sets: &mut [usize], a: usize, b: usize) -> bool {
+fn join(sets: &mut [u32], a: u32, b: u32) -> bool {
     let (a, b) = (top(sets, a), top(sets, b));
-    sets[a.max(b)] = a.min(b);
+    sets[a.max(b) as usize] = a.min(b);
     a != b
 }
 
 /// The item at the top of the tree that `item` is in.
-fn top(sets: &mut [usize], mut item: usize) -> usize {
-    while sets[item] != item {
-        sets[item] = sets[sets[item]];
-        item = sets[item];
+fn top(sets: &mut [u32], mut item: u32) -> u32 {
+    loop {
+        let above = sets[item as usize];
+        if above == item {
+            return item;
+        }
+        let next = sets[above as usize];
+        sets[item as usize] = next;
+        item = next;
     }
-    item
 }

@@ -10,9 +10,21 @@ use robust::{Coord, Coord3D, orient2d, orient3d};
 /// A triangle's corners; finite.
 pub(super) type Corners = [[f32; 3]; 3];
 
-/// Whether the corners lie on one line, or in one place.
+/// Whether the corners lie on one line, or at one point.
 pub(super) fn has_no_area(corners: &Corners) -> bool {
-    (0..3).all(|axis| turn(axis, *corners) == 0.0)
+    (0..3).all(|axis| clear_turn(axis, *corners) == 0.0) && (0..3).all(|axis| turn(axis, *corners) == 0.0)
+}
+
+/// Which way three points turn, seen along an axis: a number of that sign, and 0 if rounding may have changed the sign.
+#[inline(always)]
+pub(super) fn clear_turn(axis: usize, points: [[f32; 3]; 3]) -> f64 {
+    let (x, y) = ((axis + 1) % 3, (axis + 2) % 3);
+    let [a, b, c] = points.map(|point| [f64::from(point[x]), f64::from(point[y])]);
+    let (left, right) = ((a[0] - c[0]) * (b[1] - c[1]), (a[1] - c[1]) * (b[0] - c[0]));
+    let turn = left - right;
+    // Shewchuk's bound is (3 + 16 × 2⁻⁵³) × 2⁻⁵³ times this sum.
+    const ERROR: f64 = 4.0 / (1u64 << 53) as f64;
+    if turn.abs() > ERROR * (left.abs() + right.abs()) { turn } else { 0.0 }
 }
 
 /// Whether two triangles have a point in common that is neither a common vertex nor on a common edge. `common`: how

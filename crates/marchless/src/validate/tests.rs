@@ -1,9 +1,10 @@
 //! A mesh for every kind of defect, which has that one and no other.
 
 mod plain;
+mod threads;
 
 use super::*;
-use alloc::{string::ToString, vec};
+use alloc::{string::ToString, vec, vec::Vec};
 
 type Mesh = (Vec<[f32; 3]>, Vec<u32>);
 
