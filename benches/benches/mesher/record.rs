@@ -36,7 +36,7 @@ fn text(processor: &str, results: &Results, threads: Option<&Threads>) -> String
          One thread; times are the least of 20 samples (10 from 128³ on). Columns after the triangles per second tell \
          by what factor each peer takes longer on the same cells of the same `f32` samples: nets is fast-surface-nets \
          0.2.1, as it is and with its normals normalised; isosurface is 0.0.4, isomesh 0.0.14. The last column tells by \
-         what factor `Topology::Trilinear` takes longer than the default, and what `MeshReport` examines of the mesh. \
+         what factor `Topology::Trilinear` takes longer than the default, and how long `MeshReport` takes on all cores. \
          The samples include one of padding on each side.\n\n{}",
         compiler(),
         env!("CARGO_PKG_VERSION"),

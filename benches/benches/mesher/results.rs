@@ -185,7 +185,7 @@ impl Results {
                 notes.push(format!("Trilinear: {factor:.2}"));
             }
             if let Some(report) = self.find(field, extent, Subject::Report).filter(|_| weight == f32::NAME) {
-                notes.push(format!("MeshReport: {:.2} Mtri/s", report.triangles as f64 / report.seconds / 1e6));
+                notes.push(format!("MeshReport: {:.0} ns a triangle", report.seconds / report.triangles as f64 * 1e9));
             }
             if let Some(factor) = factor(Subject::NetsI8).filter(|_| weight == i8::NAME) {
                 notes.push(format!("nets on i8: {factor:.1}"));

@@ -1,6 +1,7 @@
 //! [`run`]: the world without any renderer, dug, checked and written to a file.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -14,6 +15,8 @@ use crate::world::{Kind, World};
 
 /// How long a step may take before something must be wrong.
 const PATIENCE: Duration = Duration::from_secs(1800);
+/// The time between two lines of progress.
+const PROGRESS_INTERVAL: Duration = Duration::from_secs(2);
 /// How far one stamp of the tunnel reaches along an axis at most. [Units: voxels]
 const LONGEST_PIECE: f32 = 2000.0;
 
@@ -118,9 +121,18 @@ fn collect(app: &mut App, terrain: &Terrain) -> Mesh {
     mesh
 }
 
+/// Examines a mesh; prints a line now and then where that takes long, and what it finds.
 fn report(mesh: &Mesh) -> MeshReport {
     let start = Instant::now();
-    let report = MeshReport::new(&mesh.positions, &mesh.indices);
+    let mut last = start;
+    let report = MeshReport::with_progress(&mesh.positions, &mesh.indices, |done| {
+        if last.elapsed() >= PROGRESS_INTERVAL {
+            println!("Checking the mesh: {:.0} %", done * 100.0);
+            last = Instant::now();
+        }
+        ControlFlow::Continue(())
+    });
+    let report = report.expect("progress never cancels");
     println!("Checked the mesh in {}: {report}.", milliseconds(start.elapsed()));
     report
 }
