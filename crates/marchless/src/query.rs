@@ -1,9 +1,9 @@
-//! Questions to a [`Grid`]: what a ray hits, and the weight anywhere.
+//! Queries of a [`Grid`]: ray casts, and the weight at any position.
 //!
-//! A ray descends through the grid's boxes of boxes of chunks into those that hold a chunk, passes by chunks that are
-//! uniform, and walks from cell to cell in the others (John Amanatides and Andrew Woo, "A Fast Voxel Traversal Algorithm
-//! for Ray Tracing", 1987). In a cell that the surface crosses it is tested against the very triangles that the mesher
-//! makes of it.
+//! A ray descends through the grid's hierarchy of boxes to the chunks, skips uniform chunks, and walks from cell to
+//! cell in the others (John Amanatides and Andrew Woo, "A Fast Voxel Traversal Algorithm
+//! for Ray Tracing", 1987). In a cell that the surface crosses, it is tested against the same triangles that the
+//! mesher makes.
 
 mod boxes;
 mod ray;
@@ -22,12 +22,11 @@ use ray::{Crossing, Cubes, Ray};
 /// Where a ray hits the surface first; lengths and positions in lattice units (voxels).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// How far from the ray's origin.
+    /// The distance from the ray's origin.
     pub distance: f64,
-    /// Where.
+    /// The point that was hit.
     pub position: [f64; 3],
-    /// The normal of the triangle that was hit, of unit length, to the outside; which side was hit, the ray's direction
-    /// tells.
+    /// The unit normal of the triangle, towards the outside, whichever side the ray came from.
     pub normal: [f32; 3],
     /// The material of the triangle's corner nearest to the hit.
     pub material: u8,
@@ -80,24 +79,24 @@ pub fn ray_cast<W: Weight>(
     BoxWalk::new(grid.occupancy(), &ray, grid.chunk_cells()).find_map(hit)
 }
 
-/// A ray that passes no more chunk positions than this is walked without a look at which of them have chunks.
+/// A ray that passes at most this number of chunk positions visits them all, without the hierarchy of boxes.
 const NEAR: f64 = 8.0;
-/// The same where meshes need no chunk; a longer ray goes by the chunks that are there all the same.
+/// The limit instead of [`NEAR`] if absent chunks may have meshes; a longer ray visits only chunks that are there.
 const MOST_WITHOUT_CHUNKS: f64 = 65536.0;
 
-/// Whether even absent chunks are inside, and the border of a bounded grid is all that ends them: so it is at isovalues
-/// beyond the weights' range.
+/// Whether absent chunks are inside, so that the border of a bounded grid has a mesh without them. This is the case at
+/// isovalues beyond the weights' range.
 fn is_shown_without_chunks<W: Weight>(grid: &Grid<W>, isovalue: f32) -> bool {
     grid.bounds().is_some() && W::OUTSIDE.inside(W::threshold(isovalue))
 }
 
-/// How far from the surface at `isovalue` a position is, in voxels, negative inside: the weight there less the isovalue.
+/// The weight at a position minus the isovalue: its distance from the surface in voxels, negative inside.
 /// `None` where the position or the isovalue is not finite.
 ///
 /// The weight is trilinear between the eight lattice points around the position, as meshes read them
-/// ([`Grid::as_meshed`]); infinite and NaN samples count as the farthest finite ones of their side. `position`: in lattice
-/// units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles, which the trilinear
-/// surface only comes close to.
+/// ([`Grid::as_meshed`]); infinite and NaN samples count as the farthest finite ones of their side. `position`: in
+/// lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles, which
+/// the trilinear surface only comes close to.
 pub fn weight_at<W: Weight>(grid: &Grid<W>, isovalue: f32, position: [f64; 3]) -> Option<f32> {
     if !position.iter().all(|v| v.is_finite()) || !isovalue.is_finite() {
         return None;
@@ -161,7 +160,7 @@ impl<'a, W: Weight> Surface<'a, W> {
         }
     }
 
-    /// Whether it is certain, without looking at single samples, that there are none.
+    /// Whether the uniform chunks alone show that there are no triangles.
     fn is_empty(&self) -> bool {
         let threshold = W::threshold(self.isovalue);
         let inside = |chunk: &Part<'_, W>| match chunk {
@@ -205,8 +204,8 @@ impl<'a, W: Weight> Surface<'a, W> {
         })
     }
 
-    /// Whether the cell at `local` lies within the chunk's own samples and has all its corners on one side. Most cells of a
-    /// ray do, and this is the quickest way to leave them.
+    /// Whether the cell at `local` lies within the chunk's own samples and has all its corners on one side. This skips
+    /// most cells of a ray quickly.
     fn is_one_sided(&self, local: [i32; 3], threshold: W::Threshold) -> bool {
         let Part::Samples(ChunkSamples { weights, .. }) = self.chunks[0] else { return false };
         if self.border.is_some() || local.iter().any(|&v| v + 1 >= self.cells) {

@@ -1,11 +1,14 @@
-//! [`MeshReport`] and [`ExtractionReport`]: what is sound and what is not in an indexed triangle mesh, whoever made it.
+//! [`MeshReport`] and [`ExtractionReport`]: the defects of an indexed triangle mesh from any source.
 //!
 //! ```text
-//! positions ──places──▶ which vertices are not finite, which lie in the same place
-//! indices ──links──▶ what surrounds each vertex: edges, fans, rims, duplicates, components
-//! both ──crossings──▶ a tree of boxes; planes, and exact predicates, where two boxes meet
+//! positions ──coincident──▶ vertices with equal positions
+//! indices ──links──▶ the triangles around each vertex: edges, fans, rims, duplicates, components
+//! both ──order──▶ triangles in spatial order ──boxes──▶ pairs whose bounding boxes overlap
+//!        ──triangle, predicates──▶ which of these pairs cross
 //! samples, mesh ──extraction──▶ which vertex lies on which crossing
 //! ```
+//!
+//! All steps but the last run as parts of [`Work`], on one thread or several.
 
 mod aabb;
 mod boxes;
@@ -26,17 +29,17 @@ pub use extraction::ExtractionReport;
 use links::Links;
 use work::Work;
 
-/// The defects of an indexed triangle mesh, counted, and what kind of surface it is.
+/// Counts the defects of an indexed triangle mesh, and says what kind of surface it is.
 ///
-/// Triangles that name a vertex which does not exist, or the same vertex twice, are counted as such and left out of
-/// everything else. What concerns edges, fans and components is told from the indices alone; positions matter to
+/// Triangles with an index out of range, or with the same index twice, are counted as such and left out of everything
+/// else. Edges, fans and components depend on the indices alone; positions matter to
 /// [`cracks`](Self::cracks), [`zero_area_triangles`](Self::zero_area_triangles),
 /// [`crossing_triangles`](Self::crossing_triangles), [`duplicate_vertices`](Self::duplicate_vertices) and
 /// [`non_finite_vertices`](Self::non_finite_vertices).
 ///
-/// Areas and crossings are exact for all finite positions, from the smallest subnormal number to the largest: they are
-/// told by Jonathan Richard Shewchuk's adaptive predicates, in `f64`, where no product of `f32` coordinates overflows
-/// or loses a bit to underflow.
+/// Areas and crossings are exact for all finite positions, from the smallest subnormal number to the largest. They rest
+/// on Jonathan Richard Shewchuk's adaptive predicates in `f64`, where the products of `f32` coordinates neither
+/// overflow nor underflow.
 ///
 /// ```
 /// use marchless::MeshReport;
@@ -54,39 +57,38 @@ use work::Work;
 pub struct MeshReport {
     /// All vertices.
     pub vertices: usize,
-    /// All whole triples of indices.
+    /// All complete triples of indices.
     pub triangles: usize,
     /// Edges of one triangle only: the rim of an open surface.
     pub boundary_edges: usize,
-    /// Those of the boundary edges that do not lie on a face of the box, where one was given
-    /// ([`MeshReport::in_box`]): the surface should go on there. 0 without a box.
+    /// Boundary edges inside the box, off its faces ([`MeshReport::in_box`]): the surface should continue there. 0
+    /// without a box.
     pub cracks: usize,
     /// Edges of three or more triangles.
     pub non_manifold_edges: usize,
-    /// Vertices whose triangles are neither one fan nor one ring around them.
+    /// Vertices whose triangles form neither one fan nor one ring around them.
     pub non_manifold_vertices: usize,
-    /// Edges along which triangles do not run in opposite directions, pair by pair (at a non-manifold edge one may
-    /// be left over).
+    /// Edges whose triangles do not pair up in opposite directions. (At a non-manifold edge, one may be left over.)
     pub inconsistent_edges: usize,
-    /// Triangles that name a vertex twice.
+    /// Triangles with the same index twice.
     pub repeated_index_triangles: usize,
-    /// Triangles of three different vertices that lie on one line, exactly, or in one place. None where a coordinate is
-    /// not finite.
+    /// Triangles of three different vertices that lie exactly on one line, or at one point. Those with a coordinate
+    /// that is not finite do not count.
     pub zero_area_triangles: usize,
-    /// Triangles with the same three vertices as another one before them, whichever way round.
+    /// Triangles with the same three vertices as an earlier one, in any order.
     pub duplicate_triangles: usize,
-    /// Pairs of triangles that have a point in common which is neither a common vertex nor on a common edge: they
-    /// pierce, touch or cover each other. Vertices in the same place are the same here, so that it makes no difference
-    /// whether triangles share them. Left out are triangles of zero area, those with a vertex that is not finite, and all
-    /// but one of each set of duplicates. Counted up to [`MeshReport::MOST_CROSSINGS`], among at most 2³¹ triangles.
+    /// Pairs of triangles that pierce, touch or cover each other: they have a point in common that is neither a common
+    /// vertex nor on a common edge. Vertices with equal positions count as one vertex here. Left out are triangles of
+    /// zero area, those with a vertex that is not finite, and all but one of each set of duplicates. Counted up to
+    /// [`MeshReport::MOST_CROSSINGS`], among at most 2³¹ triangles.
     pub crossing_triangles: usize,
-    /// Vertices in the same place as another one before them, to the last bit (−0 is 0).
+    /// Vertices whose position equals that of an earlier one, to the last bit (−0 equals 0).
     pub duplicate_vertices: usize,
     /// Vertices of no triangle.
     pub unused_vertices: usize,
     /// Vertices with a coordinate that is infinite or NaN.
     pub non_finite_vertices: usize,
-    /// Indices that name no vertex.
+    /// Indices without a vertex.
     pub out_of_range_indices: usize,
     /// Indices left over after the last whole triangle: 0, 1 or 2.
     pub stray_indices: usize,
@@ -95,34 +97,37 @@ pub struct MeshReport {
     /// Vertices − edges + triangles of the surface: 2 for a sphere, 0 for a torus, 1 for a disc; summed over the
     /// components.
     pub euler: i64,
-    /// How many handles the surface has, summed over the components: 0 for a sphere or a disc, 1 for a torus, whatever
-    /// is cut out of them. `None` where it is no consistently oriented 2-manifold.
+    /// The number of handles, summed over the components: 0 for a sphere or a disc, 1 for a torus, with or without
+    /// holes cut into them. `None` if the surface is not a consistently oriented 2-manifold.
     pub genus: Option<u64>,
 }
 
 impl MeshReport {
-    /// Where the count of [`crossing_triangles`](Self::crossing_triangles) ends: a million triangles in a heap make half
-    /// a million million pairs.
+    /// The limit of [`crossing_triangles`](Self::crossing_triangles): a million triangles in a heap can make half a
+    /// million million pairs.
     pub const MOST_CROSSINGS: usize = 10_000_000;
 
     /// Examines a mesh; rims are allowed everywhere.
     ///
     /// `indices`: three a triangle; any values and any number of them.
     ///
-    /// About a microsecond a triangle and 200 bytes for each, in O(n log n), as long as few triangles' axis-aligned boxes
-    /// overlap but those of neighbours. Beyond that, all pairs of triangles whose boxes overlap are compared: the time
-    /// grows with their number, the memory does not.
+    /// Takes 0.7 to 1.1 µs of processor time a triangle on a server core of 2023, and about 150 bytes of memory, as
+    /// long as few axis-aligned bounding boxes overlap other than those of neighbours. Beyond that, all pairs of
+    /// triangles whose boxes overlap are compared: the time grows with their number, the memory does not.
+    ///
+    /// With feature `std`, meshes of more than 65,000 triangles are examined on several threads, as many as
+    /// `std::thread::available_parallelism` says at most. The report is the same on any number of threads.
     pub fn new(positions: &[[f32; 3]], indices: &[u32]) -> Self {
-        Self::unhurried(positions, indices, None)
+        Self::to_the_end(positions, indices, None)
     }
 
-    /// Examines a mesh whose rims must lie on the faces of the box `[min, max]`; the others are
+    /// Examines a mesh whose rims must lie on the faces of the box `[min, max]`; boundary edges elsewhere are
     /// [`cracks`](Self::cracks).
     ///
-    /// A boundary edge lies on a face where both its ends do: one coordinate of both is equal to the box's `min` or
-    /// `max`, exactly, and the others are within the box.
+    /// A boundary edge lies on a face if one coordinate of both its ends is exactly the box's `min` or `max`, and the
+    /// others are within the box.
     pub fn in_box(positions: &[[f32; 3]], indices: &[u32], bounds: [[f32; 3]; 2]) -> Self {
-        Self::unhurried(positions, indices, Some(bounds))
+        Self::to_the_end(positions, indices, Some(bounds))
     }
 
     /// Whether the surface has no rim. An empty mesh is closed.
@@ -130,16 +135,18 @@ impl MeshReport {
         self.boundary_edges == 0
     }
 
-    /// Whether there is no defect: open or closed, the mesh is a consistently oriented 2-manifold that does not cross
-    /// itself, without cracks, without degenerate or duplicate parts and without indices or vertices that lead nowhere.
+    /// Whether there is no defect. The mesh, open or closed, is then a consistently oriented 2-manifold that does not
+    /// cross itself, without cracks, degenerate or duplicate triangles, stray indices and unused vertices.
     pub fn is_clean(&self) -> bool {
         self.defects().iter().all(|&(count, _, _)| count == 0)
     }
 
-    /// Examines a mesh as [`new`](Self::new) does, and tells `progress` which share of the work is done, from 0 to 1.
+    /// Examines a mesh like [`new`](Self::new), and calls `progress` with the share of the work done so far, from 0 to
+    /// 1.
     ///
-    /// `progress` decides whether to go on; `None` if it has not. It is called on the caller's thread, many times a second:
-    /// print or redraw less often. A few steps take up to a twentieth of the time each.
+    /// Returns `None` if `progress` returns `ControlFlow::Break`, which cancels the work. It is called on the caller's
+    /// thread, up to some thousand times a second, so it should print or redraw less often. Between two calls, up to a
+    /// fifth of the work may pass.
     ///
     /// ```
     /// use core::ops::ControlFlow;
@@ -161,8 +168,8 @@ impl MeshReport {
         Self::examine(positions, indices, None, &mut Work::new(threads(indices.len() / 3), &mut progress))
     }
 
-    /// Examines a mesh without telling anyone how far it is.
-    fn unhurried(positions: &[[f32; 3]], indices: &[u32], bounds: Option<[[f32; 3]; 2]>) -> Self {
+    /// Examines a mesh without progress.
+    fn to_the_end(positions: &[[f32; 3]], indices: &[u32], bounds: Option<[[f32; 3]; 2]>) -> Self {
         let mut progress = |_| ControlFlow::Continue(());
         let mut work = Work::new(threads(indices.len() / 3), &mut progress);
         Self::examine(positions, indices, bounds, &mut work).unwrap_or_default()
@@ -174,15 +181,15 @@ impl MeshReport {
         bounds: Option<[[f32; 3]; 2]>,
         work: &mut Work<'_>,
     ) -> Option<Self> {
-        // What indices can name.
-        let nameable = usize::try_from(1u64 << 32).map_or(positions.len(), |most| positions.len().min(most));
-        let coincident = Coincident::of(&positions[..nameable], 0.05, work)?;
+        // Indices have 32 bits: they reach no vertex beyond.
+        let reachable = usize::try_from(1u64 << 32).map_or(positions.len(), |limit| positions.len().min(limit));
+        let coincident = Coincident::of(&positions[..reachable], 0.05, work)?;
         let mut report = Self {
             vertices: positions.len(),
             triangles: indices.len() / 3,
             duplicate_vertices: coincident.repeated,
             non_finite_vertices: positions.iter().filter(|&&position| !is_finite(position)).count(),
-            out_of_range_indices: indices.iter().filter(|&&index| index as usize >= nameable).count(),
+            out_of_range_indices: indices.iter().filter(|&&index| index as usize >= reachable).count(),
             stray_indices: indices.len() % 3,
             ..Self::default()
         };
@@ -190,14 +197,14 @@ impl MeshReport {
         // The triangles that the surface is made of.
         let mut triangles = Cow::Borrowed(indices.as_chunks().0);
         let is_repeated = |&[a, b, c]: &[u32; 3]| a == b || b == c || c == a;
-        let exists = |triangle: &[u32; 3]| triangle.iter().all(|&index| (index as usize) < nameable);
+        let exists = |triangle: &[u32; 3]| triangle.iter().all(|&index| (index as usize) < reachable);
         if report.out_of_range_indices > 0 || triangles.iter().any(is_repeated) {
             triangles.to_mut().retain(exists);
             report.repeated_index_triangles = triangles.iter().filter(|&triangle| is_repeated(triangle)).count();
             triangles.to_mut().retain(|triangle| !is_repeated(triangle));
         }
 
-        let links = Links::of(&triangles, nameable, 0.2, work)?;
+        let links = Links::of(&triangles, reachable, 0.2, work)?;
         report.boundary_edges = links.boundary.len();
         report.cracks = bounds.map_or(0, |bounds| {
             let is_crack = |edge: &&[u32; 2]| !is_on_face(edge.map(|end| positions[end as usize]), bounds);
@@ -218,7 +225,7 @@ impl MeshReport {
         Some(report)
     }
 
-    /// Every kind of defect: how many, and the word for one and for several.
+    /// Each kind of defect: the count, and the words for one and for several.
     const fn defects(&self) -> [(usize, &'static str, &'static str); 13] {
         [
             (self.cracks, "crack", "cracks"),
@@ -262,11 +269,11 @@ impl fmt::Display for MeshReport {
     }
 }
 
-/// How many threads examine a mesh: those that the system offers, but one for every [`PER_THREAD`] triangles.
+/// The number of threads for a mesh: what the system offers, but at most one for every [`PER_THREAD`] triangles.
 #[cfg(feature = "std")]
 fn threads(triangles: usize) -> usize {
     let useful = triangles / PER_THREAD;
-    // The question takes longer than a small mesh.
+    // Asking the system takes longer than examining a small mesh.
     if useful < 2 { 1 } else { std::thread::available_parallelism().map_or(1, |offered| offered.get().min(useful)) }
 }
 
@@ -275,7 +282,7 @@ const fn threads(_triangles: usize) -> usize {
     1
 }
 
-/// Triangles for which another thread pays.
+/// The number of triangles that is worth a thread.
 #[cfg(feature = "std")]
 const PER_THREAD: usize = 1 << 15;
 
@@ -283,7 +290,7 @@ fn is_finite(position: [f32; 3]) -> bool {
     position.iter().all(|coordinate| coordinate.is_finite())
 }
 
-/// Whether some face of the box holds the whole edge.
+/// Whether an edge lies on a face of the box.
 fn is_on_face(edge: [[f32; 3]; 2], [min, max]: [[f32; 3]; 2]) -> bool {
     let within = edge.iter().all(|end| (0..3).all(|axis| min[axis] <= end[axis] && end[axis] <= max[axis]));
     let flat = |axis: usize, face: f32| edge.iter().all(|end| end[axis] == face);

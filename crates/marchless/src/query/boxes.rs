@@ -1,4 +1,4 @@
-//! [`BoxWalk`]: the chunks that a ray passes, out of any number of them, any distance apart.
+//! [`BoxWalk`]: finds the chunks along a ray among any number of chunks, at any distance from each other.
 
 use core::array::from_fn;
 
@@ -8,16 +8,16 @@ use crate::{
     lattice::Region,
 };
 
-/// A walk along a ray, from box to box on the coarsest level, and within a box that holds a chunk from box to box of the
+/// Walks along a ray from box to box of the coarsest level, and inside each box with chunks from box to box of the
 /// level below.
 ///
-/// Sorting all chunks by when the ray enters them would be simpler, and cost as much as there are chunks in the grid.
+/// Sorting all chunks by the distance at which the ray enters them would be simpler, but its cost grows with the grid.
 pub(super) struct BoxWalk<'a> {
     occupancy: &'a Occupancy,
     ray: &'a Ray,
     /// Cells per axis of a chunk.
     cells: u32,
-    /// How many boxes, chunk positions among them, the ray has passed so far: tests hold it to be small.
+    /// The number of boxes, chunk positions included, that the ray has passed so far; tests check that it stays small.
     pub(super) passed: u32,
 }
 
@@ -26,8 +26,9 @@ impl<'a> BoxWalk<'a> {
         Self { occupancy, ray, cells, passed: 0 }
     }
 
-    /// The first answer of `find`, which is asked for the chunk positions that the ray passes, in order, where the position
-    /// or one a step of 0 or 1 per axis from it holds a chunk. Others have no mesh.
+    /// Calls `find` with chunk positions along the ray, in order, until it returns something.
+    ///
+    /// Positions without a chunk at 0 or 1 step along each axis are skipped: they have no mesh.
     pub(super) fn find_map<T>(&mut self, mut find: impl FnMut([i32; 3]) -> Option<T>) -> Option<T> {
         let (level, root) = self.occupancy.root()?;
         // The mesh below the root's lowest chunk is another box's.
@@ -36,7 +37,7 @@ impl<'a> BoxWalk<'a> {
         self.ray.walk(around, boxes).find_map(|index| self.descend(level, index, &mut find))
     }
 
-    /// The same within a box.
+    /// Like [`find_map`](Self::find_map), within one box.
     fn descend<T>(&mut self, level: usize, index: [i32; 3], find: &mut impl FnMut([i32; 3]) -> Option<T>) -> Option<T> {
         let drawn = self.occupancy.drawn(level, index);
         if drawn.is_empty() {

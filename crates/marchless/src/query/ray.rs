@@ -10,12 +10,13 @@ pub(super) struct Cubes {
 }
 
 impl Cubes {
-    /// Cubes of a size, one of which lies at the origin.
+    /// Cubes with a corner at the origin.
     pub(super) const fn of(size: i64) -> Self {
         Self { size, origin: 0 }
     }
 
-    /// The plane on the low (0) or high (1) side of a cube: the same number, bit for bit, for all lattices that have it.
+    /// The plane on the low (0) or high (1) side of a cube; bit for bit the same number in all lattices with this
+    /// plane.
     const fn plane(self, cube: i32, side: i64) -> f64 {
         (self.origin + (cube as i64 + side) * self.size) as f64
     }
@@ -47,7 +48,7 @@ impl Ray {
         [0, 1, 2].map(|axis| self.origin[axis] + self.direction[axis] * distance)
     }
 
-    /// When the ray enters and leaves `region`, where it does.
+    /// The distances at which the ray enters and leaves `region`, if it does.
     pub(super) fn span(&self, region: Region, cubes: Cubes) -> Option<(f64, f64)> {
         let (mut start, mut end) = (0.0f64, self.max_distance);
         for axis in 0..3 {
@@ -62,21 +63,21 @@ impl Ray {
         (start <= end && !region.is_empty()).then_some((start, end))
     }
 
-    /// When the ray, which moves along `axis`, reaches a plane across it.
+    /// The distance at which the ray reaches a plane across `axis`; its direction along the axis is not 0.
     fn reaches(&self, axis: usize, plane: f64) -> f64 {
         (plane - self.origin[axis]) / self.direction[axis]
     }
 
-    /// No fewer than [`walk`](Self::walk) goes through.
+    /// An upper bound for the number of cubes that [`walk`](Self::walk) visits.
     pub(super) fn steps(&self, region: Region, cubes: Cubes) -> f64 {
         let Some((start, end)) = self.span(region, cubes) else { return 0.0 };
         let passed = |axis: usize| {
             let along = self.direction[axis].abs();
-            // From very far away, many planes are reached at what is the same number.
+            // Far from the origin, rounding makes the distances of many planes equal.
             let rounding = 4.0 * f64::EPSILON * (self.origin[axis].abs() + along * end);
             (along * (end - start) + rounding) / cubes.size as f64
         };
-        // One more than planes are passed, of which each axis may have one more than the length has sizes.
+        // One more than the number of planes passed; each axis may have one more plane than its length has cube sizes.
         (0..3).map(passed).sum::<f64>() + 4.0
     }
 
@@ -129,7 +130,7 @@ impl Ray {
         }
         let sum = weights[0] + weights[1] + weights[2];
         let distance = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / sum / d[z];
-        // A triangle seen from its edge has sum 0, and its distance is not a number.
+        // A triangle seen edge-on has sum 0, and its distance is NaN.
         if !(0.0..=self.max_distance).contains(&distance) {
             return None;
         }
@@ -142,7 +143,7 @@ impl Ray {
 #[derive(Clone, Copy)]
 pub(super) struct Crossing {
     pub(super) distance: f64,
-    /// Which of the triangle's corners, 0–2, has the greatest share in the point.
+    /// The triangle's corner, 0–2, with the greatest barycentric weight.
     pub(super) nearest_corner: usize,
     /// Of unit length, to the outside.
     pub(super) normal: [f32; 3],

@@ -1,4 +1,4 @@
-//! [`ExtractionReport`]: whether a mesh has its vertices where its samples' crossings are.
+//! [`ExtractionReport`]: whether the vertices of a mesh lie on the crossings of its samples.
 
 use alloc::vec;
 use core::fmt;
@@ -13,11 +13,11 @@ use crate::{
 /// Crossings stay this far from the ends of their edge, in cells.
 const MARGIN: f64 = 1.0 / 1024.0;
 
-/// Whether the vertices of a mesh lie where the samples that it was made from have their crossings.
+/// Whether the vertices of a mesh lie on the crossings of the samples that it was made from.
 ///
-/// A crossing is an edge of the lattice with one end inside and the other one outside; its vertex lies where the weight,
-/// linear along the edge, is the isovalue, but at least 1/1024 of the edge from both ends. Nothing else of the mesh is
-/// looked at: [`MeshReport`](crate::MeshReport) does that.
+/// A crossing is an edge of the lattice with one end inside and the other one outside; its vertex lies where the
+/// weight, linear along the edge, is the isovalue, but at least 1/1024 of the edge from both ends. This report is about
+/// vertices alone; [`MeshReport`](crate::MeshReport) is about triangles.
 ///
 /// ```
 /// use marchless::{ExtractionReport, MeshBuffer, MeshSettings, Mesher, Samples, Shape};
@@ -40,13 +40,12 @@ const MARGIN: f64 = 1.0 / 1024.0;
 pub struct ExtractionReport {
     /// All vertices of the mesh.
     pub vertices: usize,
-    /// The crossings of the samples: lattice edges with one end inside and the other one outside. Samples that cannot be
-    /// meshed have none.
+    /// The crossings of the samples: lattice edges with one end inside and the other one outside. 0 if the samples
+    /// cannot be meshed.
     pub crossings: usize,
-    /// Vertices that are not where they should be: on no lattice edge, on one that is no crossing, or elsewhere on it
-    /// than its crossing is.
+    /// Misplaced vertices: on no lattice edge, on an edge without a crossing, or away from the crossing on its edge.
     pub off_crossing: usize,
-    /// Vertices on a crossing that has another one before them.
+    /// Vertices on the crossing of an earlier vertex.
     pub repeated: usize,
     /// Crossings without a vertex on their edge.
     pub missing: usize,
@@ -58,8 +57,9 @@ pub struct ExtractionReport {
 impl ExtractionReport {
     /// Compares a mesh with the samples that it was made from.
     ///
-    /// `mesh`: positions in cells from the first meshed sample, any number of them, anywhere. They are compared with the
-    /// true crossings, computed in `f64`, to within what `f32` positions can say: 10⁻⁶ of a cell and 2⁻²³ of the position.
+    /// `mesh`: positions in cells from the first meshed sample; any number of them, with any values. They are compared
+    /// with the exact crossings, computed in `f64`. The tolerance is the precision of `f32` positions: 10⁻⁶ of a cell
+    /// and 2⁻²³ of the position.
     pub fn new<W: Weight>(samples: Samples<'_, W>, settings: &MeshSettings, mesh: &MeshBuffer) -> Self {
         let lattice = Lattice::of(samples, settings.isovalue);
         let mut report = Self { vertices: mesh.positions.len(), ..Self::default() };
@@ -67,8 +67,8 @@ impl ExtractionReport {
         let mut seen = [(); 3].map(|()| vec![0u64; lattice.len().div_ceil(64)]);
         let mut crossings_seen = 0;
         for &position in &mesh.positions {
-            match lattice.place_of(position) {
-                Place::Edge { low, axis } if lattice.is_crossing(low, axis) => {
+            match lattice.locate(position) {
+                Site::Edge { low, axis } if lattice.is_crossing(low, axis) => {
                     let edge = lattice.index(low);
                     let (word, bit) = (&mut seen[axis][edge / 64], 1 << (edge % 64));
                     let repeated = *word & bit != 0;
@@ -77,7 +77,7 @@ impl ExtractionReport {
                     report.repeated += usize::from(repeated);
                     report.off_crossing += usize::from(!repeated && !lattice.is_at_crossing(low, axis, position));
                 }
-                Place::Cell(low) if settings.topology == Topology::Trilinear && lattice.is_active(low) => {
+                Site::Cell(low) if settings.topology == Topology::Trilinear && lattice.is_active(low) => {
                     report.interior_vertices += 1;
                 }
                 _ => report.off_crossing += 1,
@@ -88,7 +88,7 @@ impl ExtractionReport {
         report
     }
 
-    /// Whether each crossing has one vertex, where it should be, and there are no others but interior ones.
+    /// Whether each crossing has exactly one vertex, in its position, and all other vertices are interior ones.
     pub const fn is_sound(&self) -> bool {
         self.off_crossing == 0 && self.repeated == 0 && self.missing == 0
     }
@@ -120,7 +120,7 @@ impl fmt::Display for ExtractionReport {
 }
 
 /// Where a position lies in the lattice.
-enum Place {
+enum Site {
     /// Between two neighbouring samples.
     Edge { low: [usize; 3], axis: usize },
     /// Strictly inside the cell above a sample.
@@ -133,7 +133,7 @@ enum Place {
 struct Lattice<'a, W> {
     samples: Samples<'a, W>,
     isovalue: f32,
-    /// Meshed samples per axis; less than two on one of them where there is nothing to mesh.
+    /// Meshed samples per axis; below two on some axis if there is nothing to mesh.
     size: [usize; 3],
 }
 
@@ -149,7 +149,7 @@ impl<'a, W: Weight> Lattice<'a, W> {
         self.size.iter().product()
     }
 
-    /// A meshed sample's number among the meshed samples.
+    /// The index of a meshed sample among the meshed samples.
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         x + self.size[0] * (y + self.size[1] * z)
     }
@@ -166,24 +166,24 @@ impl<'a, W: Weight> Lattice<'a, W> {
         self.weight(at) < self.isovalue
     }
 
-    /// The place of a position; beyond the lattice it is nowhere.
-    fn place_of(&self, position: [f32; 3]) -> Place {
+    /// Finds where in the lattice a position lies.
+    fn locate(&self, position: [f32; 3]) -> Site {
         let within = (0..3).all(|axis| position[axis] >= 0.0 && f64::from(position[axis]) < self.size[axis] as f64);
         if !within {
-            return Place::Elsewhere;
+            return Site::Elsewhere;
         }
         let low = position.map(|coordinate| coordinate as usize);
         let between = [0, 1, 2].map(|axis| low[axis] as f32 != position[axis]);
         // There is nothing above the last sample.
         if (0..3).any(|axis| between[axis] && low[axis] + 1 == self.size[axis]) {
-            return Place::Elsewhere;
+            return Site::Elsewhere;
         }
         match between {
-            [true, true, true] => Place::Cell(low),
-            [true, false, false] => Place::Edge { low, axis: 0 },
-            [false, true, false] => Place::Edge { low, axis: 1 },
-            [false, false, true] => Place::Edge { low, axis: 2 },
-            _ => Place::Elsewhere,
+            [true, true, true] => Site::Cell(low),
+            [true, false, false] => Site::Edge { low, axis: 0 },
+            [false, true, false] => Site::Edge { low, axis: 1 },
+            [false, false, true] => Site::Edge { low, axis: 2 },
+            _ => Site::Elsewhere,
         }
     }
 
@@ -191,11 +191,11 @@ impl<'a, W: Weight> Lattice<'a, W> {
         self.is_inside(low) != self.is_inside(stepped(low, axis))
     }
 
-    /// Whether a position on a crossing is where it should be.
+    /// Whether a position on a crossing's edge is the crossing.
     fn is_at_crossing(&self, low: [usize; 3], axis: usize, position: [f32; 3]) -> bool {
         let [a, b] = [low, stepped(low, axis)].map(|end| finite(self.weight(end)));
         let crossing = (f64::from(self.isovalue) - a) / (b - a);
-        // Both ends are the same where they are at, and beyond, a limit of `f32`.
+        // Both ends may be clamped to the same limit of `f32`.
         let crossing = if crossing.is_nan() { 0.0 } else { crossing }.clamp(MARGIN, 1.0 - MARGIN);
         let coordinate = f64::from(position[axis]);
         let fraction = coordinate - low[axis] as f64;

@@ -1,9 +1,9 @@
-//! [`Links`]: edges, fans, rims and components, told from what surrounds each vertex.
+//! [`Links`]: edges, fans, rims and components, from the triangles around each vertex.
 //!
-//! A vertex's link is what its triangles have opposite to it: a segment each, from the corner after the vertex to the
-//! one before it. The links of all vertices are gathered in one array, by counting. An edge is then a vertex and an end
-//! of a segment in its link; and the link of a vertex inside a sound surface is a ring, seen to be one in a few
-//! comparisons. Only what is no ring is sorted.
+//! The link of a vertex consists of the sides opposite to it in its triangles: a segment each, from the corner after
+//! the vertex to the one before it. A counting sort gathers the links of all vertices in one array. Each edge is then a
+//! vertex and an end of a segment in its link. In the interior of a sound surface the link is a ring, and a few
+//! comparisons show it; only other links are sorted.
 
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
@@ -80,7 +80,8 @@ impl Links {
         }
     }
 
-    /// How many handles there are, where that makes sense: 2·components − 2·genus − rims is the Euler characteristic.
+    /// The number of handles, from the Euler characteristic, which is 2·components − 2·genus − rims; `None` if the
+    /// surface is not a consistently oriented manifold.
     pub(super) fn genus(&self, euler: i64) -> Option<u64> {
         if self.non_manifold_edges + self.non_manifold_vertices + self.inconsistent_edges > 0 {
             return None;
@@ -89,7 +90,7 @@ impl Links {
         (twice % 2 == 0).then(|| u64::try_from(twice / 2).ok()).flatten()
     }
 
-    /// The closed lines that the boundary edges of a consistently oriented manifold make.
+    /// The number of closed lines that the boundary edges of a consistently oriented manifold form.
     fn rims(&self) -> usize {
         let mut edges = self.boundary.clone();
         edges.sort_unstable();
@@ -107,7 +108,7 @@ impl Links {
         rims
     }
 
-    /// Adds what the link of `vertex` shows, whatever it looks like.
+    /// Adds the counts of a link of any shape.
     fn add(&mut self, vertex: u32, link: &[Segment], scratch: &mut Scratch) {
         let Scratch { ends, fans, triangles } = scratch;
         ends.clear();
@@ -138,7 +139,7 @@ impl Links {
         }
         self.non_manifold_vertices += usize::from(crowded || fan_count > 1);
 
-        // A triangle is looked at where its lowest vertex is.
+        // Each triangle counts at its lowest vertex.
         triangles.clear();
         triangles.extend(link.iter().map(|&[a, b]| [a.min(b), a.max(b)]).filter(|&[low, _]| low > vertex));
         triangles.sort_unstable();
@@ -146,16 +147,16 @@ impl Links {
     }
 }
 
-/// Memory that [`Links::add`] uses again and again.
+/// Memory that [`Links::add`] reuses.
 #[derive(Default)]
 struct Scratch {
     ends: Vec<End>,
-    /// Disjoint sets of the segments that belong to one fan.
+    /// Disjoint sets: the segments of each fan.
     fans: Vec<u32>,
     triangles: Vec<Segment>,
 }
 
-/// An end of a segment: an edge from the vertex to a neighbour, as one triangle has it.
+/// An end of a segment: one triangle's edge between the vertex and a neighbour.
 struct End {
     neighbour: u32,
     segment: u32,
@@ -189,8 +190,8 @@ fn gathered(triangles: &[[u32; 3]], vertices: Range<usize>) -> (Vec<Segment>, Ve
     (segments, ends)
 }
 
-/// Whether a link is one ring of three or more segments, each of which ends where the next one starts. Puts them into
-/// that order as far as it can. Long links are not looked at.
+/// Whether a link is one ring of 3 to 16 segments, each of which ends where the next one starts. Puts them into that
+/// order as far as it gets.
 fn is_ring(link: &mut [Segment]) -> bool {
     if !(3..=16).contains(&link.len()) {
         return false;
@@ -198,7 +199,7 @@ fn is_ring(link: &mut [Segment]) -> bool {
     let mut end = link[0][1];
     for place in 1..link.len() {
         let (before, after) = link.split_at(place);
-        // Where a segment has started already, the ring closes too early or touches itself.
+        // If a segment before starts there, the ring closes too early or touches itself.
         if before.iter().any(|segment| segment[0] == end) {
             return false;
         }
@@ -209,7 +210,7 @@ fn is_ring(link: &mut [Segment]) -> bool {
     end == link[0][0]
 }
 
-/// How many times two sets become one when the vertices of each triangle are joined.
+/// How often two sets become one when the vertices of each triangle are joined.
 fn joins(triangles: &[[u32; 3]], vertices: usize) -> usize {
     let mut sets: Vec<u32> = (0..vertices).map(|vertex| vertex as u32).collect();
     let mut joined = 0;
@@ -219,23 +220,24 @@ fn joins(triangles: &[[u32; 3]], vertices: usize) -> usize {
     joined
 }
 
-/// Makes one set of those of `a` and `b`, and says whether they were two. `sets`: what is above each item in its set's
-/// tree; itself where it is the top. The higher number always goes below the lower one: with the halving of paths that
-/// is O(log n).
+/// Unites the sets of `a` and `b`, and returns whether they were two sets.
+///
+/// `sets`: the parent of each item in its set's tree; a root is its own parent. The root with the lower number stays
+/// the root. Path halving keeps this at O(log n).
 fn join(sets: &mut [u32], a: u32, b: u32) -> bool {
-    let (a, b) = (top(sets, a), top(sets, b));
+    let (a, b) = (root(sets, a), root(sets, b));
     sets[a.max(b) as usize] = a.min(b);
     a != b
 }
 
-/// The item at the top of the tree that `item` is in.
-fn top(sets: &mut [u32], mut item: u32) -> u32 {
+/// The root of an item's tree.
+fn root(sets: &mut [u32], mut item: u32) -> u32 {
     loop {
-        let above = sets[item as usize];
-        if above == item {
+        let parent = sets[item as usize];
+        if parent == item {
             return item;
         }
-        let next = sets[above as usize];
+        let next = sets[parent as usize];
         sets[item as usize] = next;
         item = next;
     }

@@ -3,9 +3,9 @@
 //! A cube around the points is cut into 8 × 8 × 8 cells in Morton order; each cell's points are sorted in the same way,
 //! within a cube around them alone. Few points are sorted by the Morton code of 1024 cells per axis.
 //!
-//! The new cube for each cell is what keeps the order good for any points: with one vertex at 10³⁰, all others lie in one
-//! cell of the first cube, and the next cube is around those others alone. Each step makes the cube eight times smaller,
-//! so that `f32` allows about a hundred; hills take two.
+//! The new cube for each cell keeps the order good for any points: with one vertex at 10³⁰, all others lie in one cell
+//! of the first cube, and the next cube is around those others alone. Each step makes the cube eight times smaller, so
+//! the range of `f32` allows about a hundred steps; hills take two.
 
 use alloc::{vec, vec::Vec};
 

@@ -1,9 +1,9 @@
-//! Exact answers about triangles in space: do they have an area, do they cross.
+//! Exact predicates of triangles in space: whether they have an area, and whether they cross.
 //!
 //! All signs come from the crate `robust`, after Jonathan Richard Shewchuk, "Adaptive Precision Floating-Point
 //! Arithmetic and Fast Robust Geometric Predicates" (1997). They are exact as long as nothing overflows or underflows:
 //! with coordinates that were `f32`, differences are at most 2¹²⁹ and multiples of 2⁻¹⁴⁹, their products of three at
-//! most 2³⁹⁰ and multiples of 2⁻⁴⁴⁷, all of which `f64` can say.
+//! most 2³⁹⁰ and multiples of 2⁻⁴⁴⁷, which `f64` can represent.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
@@ -28,7 +28,7 @@ pub(super) fn clear_turn(axis: usize, points: [[f32; 3]; 3]) -> f64 {
 }
 
 /// Whether two triangles have a point in common that is neither a common vertex nor on a common edge. `common`: how
-/// many of the first corners of both are the same, in the same order; all others are in different places.
+/// many of the first corners of both are equal, in the same order; all others differ.
 ///
 /// Both have an area.
 pub(super) fn cross(a: &Corners, b: &Corners, common: usize) -> bool {
@@ -44,7 +44,7 @@ pub(super) fn cross(a: &Corners, b: &Corners, common: usize) -> bool {
     }
 }
 
-/// The same for triangles without a common corner.
+/// Whether triangles without a common corner have a point in common.
 fn cross_apart(a: &Corners, b: &Corners) -> bool {
     let on_one_side = |a: &Corners, b: &Corners| {
         let sides = b.map(|corner| side(a, corner));
@@ -56,7 +56,7 @@ fn cross_apart(a: &Corners, b: &Corners) -> bool {
         && (edges(b).into_iter().any(|edge| meets(a, edge)) || edges(a).into_iter().any(|edge| meets(b, edge)))
 }
 
-/// The same for triangles whose first corner is the same: whether they go on in a common direction from there.
+/// Whether triangles with a common first corner extend in a common direction from there.
 fn cross_at_corner(a: &Corners, b: &Corners) -> bool {
     let in_a = [side(a, b[1]), side(a, b[2])];
     if in_a == [0.0; 2] {
@@ -72,7 +72,8 @@ fn cross_at_corner(a: &Corners, b: &Corners) -> bool {
     if is_one_sided(in_a) || is_one_sided(in_b) {
         return false;
     }
-    // The planes meet in a line through the corner. Let p and q lead from there to the others of `a`, P and Q to those of
+    // The planes meet in a line through the corner. Let p and q lead from there to the others of `a`, P and Q to those
+    // of
     // `b`, with n = p × q and N = P × Q. Then the line is along n × N = (p·N) q − (q·N) p = (n·Q) P − (n·P) Q: into `a`
     // where p·N ≥ 0 ≥ q·N, and into `b` where n·P ≤ 0 ≤ n·Q.
     leads_down(in_b) != leads_down(in_a)
@@ -103,8 +104,8 @@ fn meets(triangle: &Corners, [p, q]: [[f32; 3]; 2]) -> bool {
     hands.iter().all(|&hand| hand >= 0.0) || hands.iter().all(|&hand| hand <= 0.0)
 }
 
-/// The same, where the segment lies in the triangle's plane; seen along an axis along which the plane is not seen
-/// edge-on.
+/// Whether a triangle and a line segment in its plane have a point in common, seen along an axis that is not parallel
+/// to the plane.
 fn meets_in_plane(axis: usize, &[a, b, c]: &Corners, [p, q]: [[f32; 3]; 2]) -> bool {
     let sides = [[a, b], [b, c], [c, a]];
     let turns = sides.map(|[start, end]| turn(axis, [start, end, p]));
@@ -112,7 +113,7 @@ fn meets_in_plane(axis: usize, &[a, b, c]: &Corners, [p, q]: [[f32; 3]; 2]) -> b
     p_within || sides.iter().any(|&side| segments_meet(axis, [p, q], side))
 }
 
-/// Whether two segments of some length have a point in common, seen along an axis.
+/// Whether two segments, neither of length 0, have a point in common, seen along an axis.
 fn segments_meet(axis: usize, [p, q]: [[f32; 3]; 2], [a, b]: [[f32; 3]; 2]) -> bool {
     let from_pq = [turn(axis, [p, q, a]), turn(axis, [p, q, b])];
     let from_ab = [turn(axis, [a, b, p]), turn(axis, [a, b, q])];
@@ -124,7 +125,7 @@ fn segments_meet(axis: usize, [p, q]: [[f32; 3]; 2], [a, b]: [[f32; 3]; 2]) -> b
         || (0..3).all(|k| k == axis || (p[k].min(q[k]) <= a[k].max(b[k]) && a[k].min(b[k]) <= p[k].max(q[k])))
 }
 
-/// An axis along which a triangle is not seen edge-on.
+/// An axis that is not parallel to a triangle's plane.
 fn flat_axis(corners: &Corners) -> usize {
     (0..2).find(|&axis| turn(axis, *corners) != 0.0).unwrap_or(2)
 }

@@ -1,4 +1,4 @@
-//! A mesh for every kind of defect, which has that one and no other.
+//! For each kind of defect, a mesh with this defect alone.
 
 mod plain;
 mod threads;

@@ -12,8 +12,8 @@ pub(super) struct Triangle {
     vertices: [u32; 3],
     /// At right angles to the plane, about as long as twice the area.
     normal: [f64; 3],
-    /// Times the size of a box around a point and the triangle: the product of the normal and the point's distance from
-    /// the first corner must exceed this, so that rounding cannot have changed its sign.
+    /// An error bound, per length of a box around a point and the triangle: if the product of the normal and the vector
+    /// from the first corner to the point exceeds it, its sign is certain.
     error: f64,
     /// The longest side of the bounding box.
     size: f64,
@@ -28,8 +28,8 @@ impl Triangle {
             let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
             u[i] * v[j] - u[j] * v[i]
         });
-        // Shewchuk's bound for the product is 7.1 times 2⁻⁵³ times six products of three lengths, none of which is longer
-        // than the box that they are in.
+        // Shewchuk's bound for the product is 7.1 times 2⁻⁵³ times six products of three lengths, none longer than the
+        // box around them.
         let [u, v] = [u, v].map(|side| side.iter().fold(0.0, |longest: f64, length| longest.max(length.abs())));
         const ERROR: f64 = 64.0 / (1u64 << 53) as f64;
         Self { corners, vertices, normal, error: ERROR * u * v, size: aabb.longest_side() }
@@ -50,7 +50,7 @@ impl Triangle {
         if of_self == 7 {
             return true;
         }
-        // Nearly all pairs are settled here, each for a reason of its own: one branch for all reasons is quickest.
+        // This settles nearly all pairs, for reasons that alternate: one branch for all of them is fastest.
         let (other_above, other_below) = self.sides(other);
         let (self_above, self_below) = other.sides(self);
         let is_one_sided = (other_above | of_other == 7)
@@ -58,7 +58,7 @@ impl Triangle {
             | (self_above | of_self == 7)
             | (self_below | of_self == 7);
         let all_clear = (other_above | other_below | of_other == 7) & (self_above | self_below | of_self == 7);
-        // As in `predicates`: where each parts the other, both go on in a common direction or they do not.
+        // As in `predicates`: each plane parts the other triangle, and both extend in a common direction or do not.
         let at_corner = all_clear & of_self.is_power_of_two();
         let parts = is_next_set(of_self, self_above) == is_next_set(of_other, other_above);
         if is_one_sided | (at_corner & parts) {
@@ -72,7 +72,7 @@ impl Triangle {
             && self.crosses_exactly(other)
     }
 
-    /// Which corners of the other one are clearly above the plane, and which below; a bit each.
+    /// Which corners of the other triangle are clearly above this one's plane, and which below; a bit each.
     #[inline(always)]
     fn sides(&self, other: &Self) -> (u32, u32) {
         let error = self.error * (self.size + other.size);
@@ -86,9 +86,9 @@ impl Triangle {
         (above, below)
     }
 
-    /// Whether the other triangle is clearly beyond the line along one of this one's sides, except for common corners on
-    /// that side, as seen along an axis along which this one looks large. It settles most pairs in one plane, and most
-    /// pairs of neighbours on a surface like the ground.
+    /// Whether the other triangle lies clearly beyond the line through one of this triangle's sides, except for common
+    /// corners on that side, as seen along the axis nearest to the normal. Then the two have nothing else in common.
+    /// This settles most pairs in one plane, and most close pairs on a surface like the ground.
     ///
     /// `of_self`, `of_other`: the common corners, a bit each.
     fn is_clearly_beside(&self, other: &Self, of_self: u32, of_other: u32) -> bool {
@@ -114,7 +114,7 @@ impl Triangle {
     #[cold]
     #[inline(never)]
     fn crosses_exactly(&self, other: &Self) -> bool {
-        // What they have in common comes first in both.
+        // Common corners come first in both.
         let (mut a, mut b) = ((self.corners, self.vertices), (other.corners, other.vertices));
         let mut common = 0;
         for i in 0..3 {

@@ -80,11 +80,9 @@ fn in_turn<P, R>(
     Some(results)
 }
 
+/// Without `std` there are no threads.
 #[cfg(not(feature = "std"))]
-use in_turn_instead as on_threads;
-
-#[cfg(not(feature = "std"))]
-fn in_turn_instead<P, R>(
+fn on_threads<P, R>(
     _threads: usize,
     parts: impl Iterator<Item = P>,
     job: impl Fn(P) -> R,
