@@ -43,13 +43,13 @@ mod unix {
     use std::time::{Duration, Instant};
 
     use super::*;
-    use crate::program::program;
+    use crate::program::PROGRAM;
 
-    /// Runs the example below a shell's limits.
+    /// Runs the program below a shell's limits.
     fn limited(folder: &Folder, limits: &str, args: &str) -> std::process::Output {
         let line = format!("{limits}; exec \"$0\" \"$@\"");
-        let mut command = folder.command("sh");
-        command.arg("-c").arg(line).arg(program()).args(args.split_whitespace());
+        let mut command = Command::new("sh");
+        command.current_dir(folder.path("")).arg("-c").arg(line).arg(PROGRAM).args(args.split_whitespace());
         command.output().expect("there is a shell")
     }
 
@@ -140,7 +140,7 @@ mod unix {
     fn chunks_take_their_places_together_or_not_at_all() {
         let folder = Folder::new();
         sparse_ball(&folder, [256, 256, 4096], 20);
-        let mut command = folder.command(program());
+        let mut command = folder.command();
         command.args("v.raw --shape 256,256,4096 --type u8 --iso 128 --chunk 128 -o o.ply".split(' '));
         let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
         let since = Instant::now();
@@ -169,7 +169,7 @@ mod unix {
         let whole = "v.raw --shape 2048,2048,32768 --type u8 --iso 1 -o o.ply";
         let chunks = "v.raw --shape 256,256,2097152 --type u8 --iso 1 --chunk 128 -o o.ply";
         for (signal, args) in [("INT", whole), ("TERM", whole), ("INT", chunks), ("TERM", chunks)] {
-            let mut command = folder.command(program());
+            let mut command = folder.command();
             command.args(args.split(' '));
             let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
             let since = Instant::now();
@@ -262,7 +262,7 @@ mod unix {
 
     #[test]
     #[cfg(target_os = "linux")]
-    #[ignore = "reads 24 GiB of holes: cargo test --release --package marchless -- --ignored gibibyte"]
+    #[ignore = "reads 24 GiB of holes: cargo test --release --package mesh_volume -- --ignored gibibyte"]
     fn a_volume_of_8_gib_needs_less_than_a_gibibyte() {
         mesh_in(1024, 2048, 100);
     }

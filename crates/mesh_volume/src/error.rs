@@ -5,14 +5,13 @@ use std::io;
 use std::path::PathBuf;
 
 use marchless::MeshError;
-use thiserror::Error;
 
 use crate::npy::NpyError;
 use crate::output::OutputError;
 use crate::sample::{Endian, SampleType};
 
 /// Why there is no mesh, or not all is well, in one sentence. Whatever it is, no half-written file is left behind.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
     #[error("{} is both the input and the output; the mesh needs a file of its own", path.display())]
     SameFile { path: PathBuf },

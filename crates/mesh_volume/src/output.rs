@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 
 use marchless::MeshBuffer;
 use tempfile::TempPath;
-use thiserror::Error;
 
 use crate::Stop;
 use crate::args::extension;
@@ -121,7 +120,7 @@ trait Encoder {
 }
 
 /// Why a mesh is not written.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub(crate) enum OutputError {
     #[error("{0}")]
     Io(#[from] io::Error),

@@ -1,6 +1,6 @@
 //! Volumes to be meshed: their samples, and the files that hold them.
 
-/// The types of samples, as the example names them; but for bool, which has two values only.
+/// The types of samples, as the program names them; but for bool, which has two values only.
 pub(crate) const TYPES: [&str; 10] = ["i8", "u8", "i16", "u16", "i32", "u32", "i64", "u64", "f32", "f64"];
 
 /// NumPy's names for them.

@@ -1,11 +1,13 @@
-//! Runs the example `mesh_volume`, which `cargo test` has built, in a folder of the test's own.
+//! Runs the program in a folder of the test's own.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use tempfile::TempDir;
+
+/// Where the program is.
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_mesh_volume");
 
 /// A folder with volumes and what becomes of them; gone after the test.
 pub(crate) struct Folder(TempDir);
@@ -36,19 +38,19 @@ impl Folder {
         names
     }
 
-    /// The example, ready to run in the folder.
-    pub(crate) fn command(&self, program: impl AsRef<OsStr>) -> Command {
-        let mut command = Command::new(program);
+    /// The program, ready to run in the folder.
+    pub(crate) fn command(&self) -> Command {
+        let mut command = Command::new(PROGRAM);
         command.current_dir(self.0.path());
         command
     }
 
-    /// What the example makes of these arguments, split at spaces.
+    /// What the program makes of these arguments, split at spaces.
     pub(crate) fn run(&self, args: &str) -> Output {
-        self.command(program()).args(args.split_whitespace()).output().expect("the example can be run")
+        self.command().args(args.split_whitespace()).output().expect("the program can be run")
     }
 
-    /// Runs the example, which must succeed and say nothing that is wrong.
+    /// Runs the program, which must succeed and say nothing that is wrong.
     #[track_caller]
     pub(crate) fn mesh(&self, args: &str) -> String {
         let output = self.run(args);
@@ -57,7 +59,7 @@ impl Folder {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Runs the example, which must succeed, but have something to note.
+    /// Runs the program, which must succeed, but have something to note.
     #[track_caller]
     pub(crate) fn mesh_noting(&self, args: &str) -> String {
         let output = self.run(args);
@@ -70,7 +72,7 @@ impl Folder {
         errors
     }
 
-    /// Runs the example, which must refuse with one sentence that has all of `because` in it, and leave all files as
+    /// Runs the program, which must refuse with one sentence that has all of `because` in it, and leave all files as
     /// they were.
     #[track_caller]
     pub(crate) fn assert_refused(&self, args: &str, code: i32, because: &[&str]) {
@@ -84,13 +86,4 @@ impl Folder {
         }
         assert_eq!(self.names(), before, "{args}");
     }
-}
-
-/// Where the example is.
-pub(crate) fn program() -> PathBuf {
-    let test = std::env::current_exe().expect("a test knows where it is");
-    let folder = test.ancestors().nth(2).expect("tests lie in a folder beside the examples'").join("examples");
-    let program = folder.join(format!("mesh_volume{}", std::env::consts::EXE_SUFFIX));
-    assert!(program.exists(), "{} is missing; `cargo test --package marchless` builds it", program.display());
-    program
 }

@@ -8,7 +8,7 @@ use crate::program::Folder;
 use crate::readers::{self, Mesh};
 use crate::volumes::{TYPES, Volume, random};
 
-/// What the example makes of a volume, by default and exactly, and both reports in the volume's box.
+/// What the program makes of a volume, by default and exactly, and both reports in the volume's box.
 fn both(volume: &Volume, iso: f64) -> [(Mesh, MeshReport); 2] {
     let folder = Folder::new();
     folder.write("v.raw", &volume.bytes());

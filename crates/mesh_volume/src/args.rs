@@ -13,7 +13,7 @@ use crate::sample::{Endian, SampleType};
 #[derive(Parser, Debug)]
 #[command(name = "mesh_volume")]
 pub(crate) struct Args {
-    /// The volume: plain samples, x fastest (.raw), or a NumPy array with the indices [z][y][x] (.npy).
+    /// The volume: plain samples, x fastest (.raw), or a NumPy array with the indices `[z][y][x]` (.npy).
     #[arg(value_name = "IN.{raw,npy}")]
     pub(crate) input: PathBuf,
 

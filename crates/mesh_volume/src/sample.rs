@@ -3,6 +3,9 @@
 //! The mesher computes with integers of up to 16 bits and with `f32`. So samples of up to 16 bits stay exactly what they
 //! are. Of all others, the difference to the isovalue becomes an `f32`; what is rounded is that difference, to 24 bits.
 
+#[cfg(test)]
+mod tests;
+
 use std::fmt;
 
 use clap::ValueEnum;

@@ -1,4 +1,4 @@
-//! Plain readers of what the example writes; strict, since they read nothing else.
+//! Plain readers of what the program writes; strict, since they read nothing else.
 
 use std::collections::HashMap;
 
