@@ -231,12 +231,12 @@ fn caves_may_be_all_or_nothing() {
 
 #[test]
 fn the_pictures_of_bits_are_of_the_page_s_functions() {
-    assert_drawn("../crates/marchless/docs/bits.md", "examples/bits_pictures/snippets.rs", 5);
+    assert_drawn("../crates/marchless/docs/bits.md", "bits_pictures/snippets.rs", 5);
 }
 
 #[test]
 fn the_pictures_of_sources_are_of_the_page_s_functions() {
-    assert_drawn("../crates/bevy_marchless/docs/sources.md", "examples/source_pictures/snippets.rs", 9);
+    assert_drawn("../crates/bevy_marchless/docs/sources.md", "source_pictures/snippets.rs", 9);
 }
 
 /// What stands before `fn main` in the page's programs, but for `use`, stands in the same words in what is drawn.
