@@ -14,6 +14,10 @@ target="$(realpath -m "${CARGO_TARGET_DIR:-target}")/address_sanitizer"
 # Tests ask for more memory than there is, and want to be told.
 export ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}allocator_may_return_null=1"
 # For a named target, flags leave build scripts and procedural macros alone.
-RUSTFLAGS="-Zsanitizer=address" cargo +nightly test --quiet --locked --target "$host" --target-dir "$target" \
-    --package marchless --lib --test backends --test oracle --test surface --test bits_ops --test bits_masks
+sanitized() {
+    RUSTFLAGS="-Zsanitizer=address" cargo +nightly test --quiet --locked --target "$host" --target-dir "$target" \
+        --package marchless "$@"
+}
+sanitized --lib
+sanitized --test suite -- backends:: oracle:: surface:: bits_ops:: bits_masks::
 echo "AddressSanitizer: no read or write beyond a buffer"

@@ -6,6 +6,7 @@ use core::{
 };
 use std::alloc::System;
 
+use fastrand::Rng;
 use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 
 thread_local! {
@@ -43,12 +44,11 @@ fn allocations(work: impl FnOnce()) -> usize {
 /// A weight for every sample: `bumpiness` 0 is a ball, more adds noise.
 fn weights<W: Weight>(shape: Shape, bumpiness: f32) -> Vec<W> {
     let [nx, ny, nz] = shape.size();
-    let mut weights = Vec::new();
+    let (mut weights, mut random) = (Vec::new(), Rng::with_seed(1));
     for (z, y, x) in (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| (z, y, x)))) {
-        let noise = (x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791)) >> 8 & 255;
         let from_middle = [(x, nx), (y, ny), (z, nz)].map(|(at, size)| at as f32 - size as f32 / 2.0);
         let ball = from_middle.iter().map(|v| v * v).sum::<f32>().sqrt() - ny as f32 / 3.0;
-        weights.push(W::from_voxels(ball + bumpiness * (noise as f32 / 128.0 - 1.0)));
+        weights.push(W::from_voxels(ball + bumpiness * (2.0 * random.f32() - 1.0)));
     }
     weights
 }

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::program::Folder;
 use crate::readers::{self, Mesh};
-use crate::volumes::{self, TYPES, Volume};
+use crate::volumes::{TYPES, Volume, random};
 
 /// A vertex, bit for bit.
 type Vertex = [[u32; 3]; 2];
@@ -117,7 +117,7 @@ proptest! {
     ) {
         let volume = Volume::new(size, kind, |[x, y, z]| {
             let wave = (x as f64 * 0.9 + seed as f64).sin() + (y as f64 * 1.1).cos() + (z as f64 * 0.8).sin();
-            60.0 + 20.0 * wave + amplitude * (volumes::random((seed + x + 100 * (y + 100 * z)) as u64) - 0.5)
+            60.0 + 20.0 * wave + amplitude * (random(seed + x + 100 * (y + 100 * z)) - 0.5)
         });
         let folder = Folder::new();
         folder.write("v.npy", &if fortran { volume.npy_fortran() } else { volume.npy(1) });

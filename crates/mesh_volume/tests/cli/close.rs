@@ -42,8 +42,7 @@ fn closed_is_padded_by_hand() {
     for (index, kind) in KINDS.into_iter().enumerate() {
         // Numbers that leave a difference to the isovalue without rounding, and some that are none.
         let (iso, scale) = if kind == "bool" { (0.5, 1.0) } else { (10.5, 20.0) };
-        let mut volume =
-            Volume::new([7, 6, 8], kind, |[x, y, z]| (scale * random((x + 10 * (y + 10 * z)) as u64)).round());
+        let mut volume = Volume::new([7, 6, 8], kind, |[x, y, z]| (scale * random(x + 10 * (y + 10 * z))).round());
         if kind.starts_with('f') {
             for (place, sample) in
                 [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, iso, 1e-30, 3e38].into_iter().enumerate()
@@ -154,7 +153,7 @@ proptest! {
     fn the_mesh_is_closed_and_clean(
         size in prop::array::uniform3(2usize..9),
         kind in prop::sample::select(&KINDS[..]),
-        seed in 0u64..1000,
+        seed in 0usize..1000,
         share in 0.0..1.0f64,
         (fortran, invert, exact) in any::<(bool, bool, bool)>(),
         cells in 2usize..5,
@@ -164,7 +163,7 @@ proptest! {
         let numbers = [0.0, 1.0, 2.0, 5.0, 1.0, 7.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e-300];
         let count = if kind.starts_with('f') { numbers.len() } else { 6 };
         let volume = Volume::new(size, kind, |[x, y, z]| {
-            let place = seed + 1000 * (x + 10 * (y + 10 * z)) as u64;
+            let place = seed + 1000 * (x + 10 * (y + 10 * z));
             if random(place) < share { 0.0 } else { numbers[(random(place + 500_000) * count as f64) as usize] }
         });
         let folder = Folder::new();

@@ -39,7 +39,7 @@ fn corners_that_the_interpolant_joins_are_joined() {
 
 #[test]
 fn the_exact_surface_differs_only_within_cells() {
-    let volume = Volume::new([20, 17, 19], "f32", |[x, y, z]| random((x + 100 * (y + 100 * z)) as u64) - 0.5);
+    let volume = Volume::new([20, 17, 19], "f32", |[x, y, z]| random(x + 100 * (y + 100 * z)) - 0.5);
     let [(default, report), (exact, exact_report)] = both(&volume, 0.0);
     assert!(report.is_clean() && exact_report.is_clean(), "{report}; {exact_report}");
     assert!(exact_report.euler != report.euler && exact.positions.len() > default.positions.len());

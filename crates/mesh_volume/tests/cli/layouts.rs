@@ -71,7 +71,7 @@ fn bytes_before_the_samples_are_skipped() {
 #[test]
 fn bools_are_0_and_1() {
     let folder = Folder::new();
-    let mask = |kind| Volume::new([9, 8, 7], kind, |[x, y, z]| random((x + 10 * (y + 10 * z)) as u64).round());
+    let mask = |kind| Volume::new([9, 8, 7], kind, |[x, y, z]| random(x + 10 * (y + 10 * z)).round());
     let numbers = mask("i8");
     folder.write("v.raw", &numbers.bytes());
     folder.write("v.npy", &mask("bool").npy(1));

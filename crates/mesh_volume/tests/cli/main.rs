@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
 use program::Folder;
 use readers::Mesh;
-use volumes::{TYPES, Volume};
+use volumes::{TYPES, Volume, random};
 
 /// What the mesher makes of the whole volume at once, as far as its numbers fit the weights of the core.
 fn whole(volume: &Volume, iso: f64) -> Mesh {
@@ -245,8 +245,4 @@ fn the_surface_lies_between_the_same_samples_in_every_type() {
             assert_eq!(errors.contains("note: there is no surface"), edges.is_empty(), "{kind} at {iso:e}: {errors}");
         }
     }
-}
-
-fn random(seed: usize) -> f64 {
-    volumes::random(seed as u64)
 }

@@ -41,7 +41,7 @@ impl Volume {
     pub(crate) fn ball(size: [usize; 3], kind: &'static str, radius: f64, noise: f64) -> Self {
         Self::new(size, kind, |point| {
             let squares = (0..3).map(|axis| (point[axis] as f64 - (size[axis] - 1) as f64 / 2.0).powi(2));
-            let seed = (point[0] + 1000 * (point[1] + 1000 * point[2])) as u64;
+            let seed = point[0] + 1000 * (point[1] + 1000 * point[2]);
             100.0 * squares.sum::<f64>().sqrt() / radius + noise * (random(seed) - 0.5)
         })
     }
@@ -101,11 +101,8 @@ pub(crate) fn npy(version: u8, header: &str, data: &[u8]) -> Vec<u8> {
 }
 
 /// A number from 0 to 1 for each seed.
-pub(crate) fn random(seed: u64) -> f64 {
-    let mut bits = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    bits = (bits ^ bits >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    bits = (bits ^ bits >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (bits >> 11) as f64 / (1u64 << 53) as f64
+pub(crate) fn random(seed: usize) -> f64 {
+    fastrand::Rng::with_seed(seed as u64).f64()
 }
 
 /// What a sample of this type can hold of a number.

@@ -3,6 +3,8 @@
 use marchless::{BOUND_BOX_CHUNKS, Bound, Chunk, Grid, Region, Source, SourceRegion};
 use proptest::prelude::*;
 
+use crate::support::random;
+
 const CELLS: u32 = 8;
 
 #[derive(Clone, Copy, Debug)]
@@ -62,12 +64,7 @@ impl Knows {
             Self::Nothing => false,
             Self::Large(size) => region.size[0] >= size,
             Self::Small(size) => region.size[0] <= size,
-            Self::Some(seed) => {
-                let numbers = region.min.map(|v| v as u64).into_iter().chain(region.size.map(u64::from));
-                let mixed =
-                    numbers.fold(seed, |state, v| (state ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31));
-                mixed >> 20 & 1 == 1
-            }
+            Self::Some(seed) => random(random(seed, region.min), region.size) & 1 == 1,
         }
     }
 }

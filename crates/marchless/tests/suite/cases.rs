@@ -4,10 +4,9 @@
 //! group is cut off by one segment between the two edges that leave it; which way the segment runs follows from
 //! where the group lies. A case's triangles must have exactly these segments as their boundary.
 
-extern crate alloc;
+use std::collections::{BTreeMap, BTreeSet};
 
-use alloc::collections::{BTreeMap, BTreeSet};
-
+use fastrand::Rng;
 use marchless::{
     CaseIndex, Corner, Edge, MeshReport,
     cases::{CROSSED_EDGES, TRIANGLE_COUNTS, TRIANGLES},
@@ -282,22 +281,15 @@ fn crossing_triangles_are_noticed() {
 
 #[test]
 fn triangles_never_cross_at_random_placements() {
-    let mut state = 0x9e37_79b9_7f4a_7c15u64;
-    let mut random = |below: u64| {
-        // Marsaglia's xorshift.
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 20) % below
-    };
+    let mut random = Rng::with_seed(256);
     for case in 0..256 {
         let triangles = triangles(case);
         for _ in 0..500 {
             // Ends more often than chance would have it: that is where triangles come close.
-            let steps = [(); 12].map(|()| match random(4) {
+            let steps = [(); 12].map(|()| match random.u8(..4) {
                 0 => 1,
                 1 => STEPS - 1,
-                _ => 1 + random(STEPS as u64 - 1) as i64,
+                _ => random.i64(1..STEPS),
             });
             assert_nothing_crosses(case, &triangles, &steps);
         }

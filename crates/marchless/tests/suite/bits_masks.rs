@@ -6,6 +6,8 @@ use marchless::{
 };
 use proptest::prelude::*;
 
+use crate::support::{points, random};
+
 /// Sizes around those of tiles and words, and of what vector instructions take at once.
 const SIZES: [u32; 13] = [1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 130];
 
@@ -18,15 +20,11 @@ fn shapes() -> impl Strategy<Value = Shape> {
 }
 
 /// A coin for each point, set in `share` of 256.
-fn coin(seed: u64, share: u8, [x, y, z]: [u32; 3]) -> bool {
-    let mut hash = seed ^ u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z);
-    for _ in 0..2 {
-        hash = (hash ^ hash >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-    (hash >> 56) as u8 <= share
+fn coin(seed: u64, share: u8, point: [u32; 3]) -> bool {
+    random(seed, point) as u8 <= share
 }
 
-fn random(shape: Shape, seed: u64, share: u8) -> BitGrid {
+fn random_grid(shape: Shape, seed: u64, share: u8) -> BitGrid {
     BitGrid::from_fn(shape, |point| coin(seed, share, point)).expect("it is small")
 }
 
@@ -40,10 +38,6 @@ fn plain(cell: [u32; 3], is_set: impl Fn([u32; 3]) -> bool) -> u8 {
     mask
 }
 
-fn points([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
-    (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
-}
-
 fn random_tile(seed: u64) -> Tile {
     Tile::from_words(core::array::from_fn(|z| {
         points([8, 8, 1]).map(|[x, y, _]| u64::from(coin(seed, 100, [x, y, z as u32])) << (x + 8 * y)).sum()
@@ -53,7 +47,7 @@ fn random_tile(seed: u64) -> Tile {
 proptest! {
     #[test]
     fn rows_agree_with_corners(shape in shapes(), seed: u64, share: u8) {
-        let grid = random(shape, seed, share);
+        let grid = random_grid(shape, seed, share);
         let mut masks = vec![3; 100];
         if shape.size().contains(&1) {
             prop_assert_eq!(grid.case_masks(), Err(BitsError::TooSmall { shape }));
@@ -72,7 +66,7 @@ proptest! {
 
     #[test]
     fn tiles_agree_with_corners(shape in shapes(), seed: u64, share: u8) {
-        let grid = random(shape, seed, share);
+        let grid = random_grid(shape, seed, share);
         let cut = TileGrid::from_bits(&grid).expect("it is small");
         let mut all = vec![3; 100];
         cut.case_masks_into(&mut all).expect("it is small");

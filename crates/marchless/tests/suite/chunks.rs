@@ -1,7 +1,6 @@
 //! Random volumes, meshed whole and in chunks that are cut out of them by hand, in both topologies: every surface is
 //! sound, and the chunks' borders match edge for edge, bit for bit.
 
-#[path = "support/volumes.rs"]
 mod volumes;
 
 use std::collections::{HashMap, HashSet};

@@ -3,6 +3,8 @@
 use marchless::{Samples, Shape, Weight};
 use proptest::{prelude::*, sample::select};
 
+use crate::support::random;
+
 /// What the samples are like.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Kind {
@@ -43,19 +45,12 @@ impl Volume {
             .prop_map(|(kind, seed, cells, enclosed, isovalue)| Self { kind, seed, cells, enclosed, isovalue })
     }
 
-    fn bits(&self, point: [i32; 3]) -> u64 {
-        point.iter().fold(self.seed, |hash, &coordinate| {
-            let mixed = (hash ^ u64::from(coordinate as u32)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) ^ mixed >> 32
-        })
-    }
-
     fn weight<W: VolumeWeight>(&self, point: [i32; 3]) -> W {
         let within = |axis: usize| point[axis] > 0 && point[axis] < self.cells[axis] as i32;
         if self.enclosed && !(0..3).all(within) {
             return W::OUTSIDE;
         }
-        let bits = self.bits(point);
+        let bits = random(self.seed, point);
         let sign = if bits >> 63 == 1 { -1.0 } else { 1.0 };
         let step = 1.0 / W::SCALE;
         match self.kind {
@@ -79,7 +74,7 @@ impl Volume {
         let points = marchless::Region::new(min, max);
         let shape = Shape::new(points.size()).expect("a small shape");
         let weights = points.points().map(|point| self.weight(point)).collect();
-        let materials = points.points().map(|point| (self.bits(point) >> 20) as u8).collect();
+        let materials = points.points().map(|point| (random(self.seed, point) >> 20) as u8).collect();
         Cut { shape, weights, materials }
     }
 }

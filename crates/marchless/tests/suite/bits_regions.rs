@@ -2,11 +2,14 @@
 
 use std::collections::HashSet;
 
+use fastrand::Rng;
 use marchless::{
     Region, Shape,
     bits::{BitGrid, BitsError, Connectivity},
 };
 use proptest::{array::uniform3, prelude::*, test_runner::TestCaseResult};
+
+use crate::support::{points, random};
 
 /// Sizes around those of words.
 const SIZES: [u32; 12] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 600];
@@ -20,26 +23,17 @@ struct Case {
 }
 
 impl Case {
-    fn is_set(&self, [x, y, z]: [u32; 3]) -> bool {
-        let mut hash = self.seed ^ u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z);
-        for _ in 0..2 {
-            hash = (hash ^ hash >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        }
-        (hash ^ hash >> 29) % 8 < self.eighths
+    fn is_set(&self, point: [u32; 3]) -> bool {
+        random(self.seed, point) % 8 < self.eighths
     }
 
     fn grid(&self) -> BitGrid {
         BitGrid::from_fn(Shape::new(self.size).unwrap(), |point| self.is_set(point)).unwrap()
     }
 
-    fn points(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
-        let [nx, ny, nz] = self.size;
-        (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
-    }
-
     /// The points that are set, in the order of memory.
     fn set(&self) -> Vec<[u32; 3]> {
-        self.points().filter(|&point| self.is_set(point)).collect()
+        points(self.size).filter(|&point| self.is_set(point)).collect()
     }
 }
 
@@ -93,15 +87,8 @@ fn bounds(points: &HashSet<[u32; 3]>) -> Region {
 
 /// Some points of the grid, set or not.
 fn some_points(case: &Case, count: usize) -> Vec<[u32; 3]> {
-    (0..count as u64)
-        .map(|index| {
-            let mut hash = (case.seed ^ index).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            case.size.map(|size| {
-                hash = (hash ^ hash >> 31).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-                (hash >> 33) as u32 % size
-            })
-        })
-        .collect()
+    let mut random = Rng::with_seed(case.seed);
+    (0..count).map(|_| case.size.map(|size| random.u32(..size))).collect()
 }
 
 fn floods_are_what_a_queue_reaches(case: Case, count: usize) -> TestCaseResult {
@@ -157,7 +144,7 @@ fn components_are_what_a_queue_finds(case: Case) -> TestCaseResult {
         prop_assert_eq!(components.is_empty(), set.is_empty());
         prop_assert!(components.iter().map(|component| component.size).eq(sizes.iter().copied()));
         prop_assert_eq!(components.iter().map(|component| component.size).sum::<usize>(), grid.count());
-        prop_assert!(case.points().all(|point| components.label(point).is_some() == case.is_set(point)));
+        prop_assert!(points(case.size).all(|point| components.label(point).is_some() == case.is_set(point)));
         prop_assert!(components.keep(|_| true) == grid && components.keep(|_| false).is_empty());
         let most = sizes.iter().copied().max();
         prop_assert_eq!(components.largest(), sizes.iter().position(|&size| Some(size) == most));

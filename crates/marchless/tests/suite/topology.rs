@@ -1,23 +1,16 @@
 //! The topology of the surface against references that know nothing of cases, loops or decisions: digital topology for
 //! the default, a refinement of the trilinear interpolant for the exact one.
 
-#[path = "topology/digital.rs"]
 mod digital;
-#[path = "topology/disjoint.rs"]
 mod disjoint;
-#[path = "topology/pieces.rs"]
 mod pieces;
-#[path = "support/random.rs"]
-mod random;
-#[path = "topology/refined.rs"]
 mod refined;
-#[path = "topology/saddles.rs"]
 mod saddles;
 
 use digital::Digital;
+use fastrand::Rng;
 use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 use pieces::{Piece, pieces_of};
-use random::Random;
 use refined::Lattice;
 
 /// How far saddles keep away from the isovalue, in parts of the range of a cell's values.
@@ -26,14 +19,14 @@ const DISTANCE: f64 = 0.05;
 const FIELDS: usize = 200;
 
 /// A random number whose products with small whole numbers are exact; the sign is given.
-fn value(inside: bool, random: &mut Random) -> f64 {
-    let magnitude = (1 + random.below(4096)) as f64 / 4096.0;
+fn value(inside: bool, random: &mut Rng) -> f64 {
+    let magnitude = (1 + random.u64(..4096)) as f64 / 4096.0;
     if inside { -magnitude } else { magnitude }
 }
 
 /// Any value, inside or outside.
-fn any_value(random: &mut Random) -> f64 {
-    let inside = random.below(2) == 0;
+fn any_value(random: &mut Rng) -> f64 {
+    let inside = random.bool();
     value(inside, random)
 }
 
@@ -78,7 +71,7 @@ fn is_ambiguous(case: usize) -> bool {
 }
 
 /// A random cell with these signs, all of whose saddles keep their distance.
-fn random_cell(case: usize, random: &mut Random) -> Lattice {
+fn random_cell(case: usize, random: &mut Rng) -> Lattice {
     loop {
         let corners = core::array::from_fn(|corner| value(case >> corner & 1 == 1, random));
         if saddles::distance(&corners) >= DISTANCE {
@@ -111,7 +104,7 @@ fn the_refinement_knows_simple_cells() {
 
 #[test]
 fn cells_that_leave_nothing_to_decide_are_the_same_in_both() {
-    let mut random = Random::new(1);
+    let mut random = Rng::with_seed(1);
     for case in (0..256).filter(|&case| !is_ambiguous(case)) {
         for _ in 0..4 {
             let lattice = random_cell(case, &mut random);
@@ -127,7 +120,7 @@ fn cells_that_leave_nothing_to_decide_are_the_same_in_both() {
 fn ambiguous_cells_have_the_topology_of_the_interpolant() {
     let seed = 0x7472_696c_696e_6561;
     println!("seed {seed:#x}");
-    let mut random = Random::new(seed);
+    let mut random = Rng::with_seed(seed);
     let (mut cells, mut agree, mut as_separated) = (0, 0, 0);
     let mut first = None;
     for case in (0..256).filter(|&case| is_ambiguous(case)) {
@@ -153,15 +146,15 @@ fn ambiguous_cells_have_the_topology_of_the_interpolant() {
 /// Values that all weights hold exactly; ties and all.
 #[test]
 fn cells_of_all_weights_and_isovalues_are_alike() {
-    let mut random = Random::new(816);
+    let mut random = Rng::with_seed(816);
     for case in (0..256).filter(|&case| is_ambiguous(case)) {
         for number in 0..60 {
             let steps = [1, 3, 60][number % 3];
             let lattice = cell(core::array::from_fn(|corner| {
-                let magnitude = (1 + random.below(steps)) as f64 / 32.0;
+                let magnitude = (1 + random.u64(..steps)) as f64 / 32.0;
                 if case >> corner & 1 == 1 { -magnitude } else { magnitude }
             }));
-            let isovalue = random.below(121) as f32 / 32.0 - 60.0 / 32.0;
+            let isovalue = random.u64(..121) as f32 / 32.0 - 60.0 / 32.0;
             let settings = MeshSettings { isovalue, topology: Topology::Trilinear, ..MeshSettings::default() };
             let expected = pieces_of(&mesh(&lattice, Topology::Trilinear));
             for mesh in [mesh_of::<i8>, mesh_of::<i16>, mesh_of::<f32>] {
@@ -172,11 +165,11 @@ fn cells_of_all_weights_and_isovalues_are_alike() {
 }
 
 /// A lattice of random samples, all of whose saddles keep their distance; with air around it where it is `enclosed`.
-fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Random) -> Lattice {
+fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Rng) -> Lattice {
     let size = cells.map(|n| n as usize + 1);
     let mut field = Lattice { size, values: vec![1.0; size.iter().product()] };
     let outermost = |point: [usize; 3]| (0..3).any(|axis| point[axis] == 0 || point[axis] + 1 == size[axis]);
-    let phases = [(); 6].map(|()| random.unit() * 6.0);
+    let phases = [(); 6].map(|()| random.f64() * 6.0);
     let points: Vec<[usize; 3]> =
         (0..field.values.len()).map(|i| [i % size[0], i / size[0] % size[1], i / size[0] / size[1]]).collect();
     for (index, &point) in points.iter().enumerate() {
@@ -196,7 +189,7 @@ fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Rand
             return field;
         }
         for cell in spoilt {
-            let corner = random.below(8) as usize;
+            let corner = random.u64(..8) as usize;
             let point = core::array::from_fn(|axis| cell[axis] + (corner >> axis & 1));
             let index = field.index(point);
             field.values[index] = if enclosed && outermost(point) { value(false, random) } else { any_value(random) };
@@ -208,11 +201,11 @@ fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Rand
 fn fields_have_the_topology_of_the_interpolant() {
     let seed = 0x6669_656c_6473;
     println!("seed {seed:#x}");
-    let mut random = Random::new(seed);
+    let mut random = Rng::with_seed(seed);
     let (mut agree, mut as_separated, mut pieces, mut handles) = (0, 0, 0, 0);
     let mut first = None;
     for number in 0..FIELDS {
-        let cells = [(); 3].map(|()| 4 + random.below(5));
+        let cells = [(); 3].map(|()| 4 + random.u64(..5));
         let (enclosed, smooth) = (number % 2 == 0, number % 4 < 2);
         let field = loop {
             let field = random_field(cells, enclosed, smooth, &mut random);
@@ -249,16 +242,16 @@ fn fields_have_the_topology_of_the_interpolant() {
 }
 
 /// A set of points with room around it.
-fn random_set(size: [usize; 3], share: u64, random: &mut Random) -> Digital {
+fn random_set(size: [usize; 3], share: u64, random: &mut Rng) -> Digital {
     let len: usize = size.iter().product();
-    let inside = |index: usize, random: &mut Random| {
+    let inside = |index: usize, random: &mut Rng| {
         let at = [index % size[0], index / size[0] % size[1], index / size[0] / size[1]];
-        (0..3).all(|axis| at[axis] > 0 && at[axis] + 1 < size[axis]) && random.below(16) < share
+        (0..3).all(|axis| at[axis] > 0 && at[axis] + 1 < size[axis]) && random.u64(..16) < share
     };
     Digital { size, inside: (0..len).map(|index| inside(index, random)).collect() }
 }
 
-fn check_digital(set: &Digital, random: &mut Random) {
+fn check_digital(set: &Digital, random: &mut Rng) {
     let values = set.inside.iter().map(|&inside| value(inside, random)).collect();
     let mesh = mesh(&Lattice { size: set.size, values }, Topology::Separated);
     let report = MeshReport::new(&mesh.positions, &mesh.indices);
@@ -269,7 +262,7 @@ fn check_digital(set: &Digital, random: &mut Random) {
 
 #[test]
 fn the_default_topology_is_that_of_6_and_18_neighbours() {
-    let mut random = Random::new(6 + 18);
+    let mut random = Rng::with_seed(6 + 18);
     for case in 0..256u32 {
         let inside = |index: usize| {
             let at = [index % 4, index / 4 % 4, index / 16];
@@ -279,10 +272,10 @@ fn the_default_topology_is_that_of_6_and_18_neighbours() {
     }
     let (mut sets, seed) = (0, 0x6469_6769_7461_6c00);
     println!("seed {seed:#x}");
-    let mut random = Random::new(seed);
+    let mut random = Rng::with_seed(seed);
     for share in 2..=14 {
         for _ in 0..200 {
-            let size = [(); 3].map(|()| 3 + random.below(8) as usize);
+            let size = [(); 3].map(|()| 3 + random.u64(..8) as usize);
             check_digital(&random_set(size, share, &mut random), &mut random);
             sets += 1;
         }

@@ -55,7 +55,6 @@ impl<W: TestWeight> Field<W> {
     }
 
     /// Meshed samples per axis.
-    #[allow(dead_code, reason = "not every test that shares this file needs it")]
     pub(crate) fn meshed_size(&self) -> [u32; 3] {
         self.shape.size().map(|n| n - 2 * u32::from(self.padded))
     }

@@ -6,6 +6,8 @@ use marchless::{
 };
 use proptest::prelude::*;
 
+use crate::support::{points, random};
+
 /// Sizes around those of words, and of what vector instructions take at once.
 const SIZES: [u32; 12] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 600];
 
@@ -17,29 +19,15 @@ fn shapes() -> impl Strategy<Value = Shape> {
     })
 }
 
-/// A fair coin for each point.
-fn coin(seed: u64, [x, y, z]: [u32; 3]) -> u64 {
-    let mut hash = seed ^ u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z);
-    for _ in 0..2 {
-        hash = (hash ^ hash >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-    hash ^ hash >> 29
-}
-
-fn points(shape: Shape) -> impl Iterator<Item = [u32; 3]> {
-    let [nx, ny, nz] = shape.size();
-    (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
-}
-
 fn same_as_samples<W: Weight + PartialOrd>(shape: Shape, seed: u64, weight: impl Fn(u64) -> W, padded: bool) {
-    let weights: Vec<W> = points(shape).map(|point| weight(coin(seed, point))).collect();
+    let weights: Vec<W> = points(shape.size()).map(|point| weight(random(seed, point))).collect();
     let mut samples = Samples::new(shape, &weights).expect("as many as points");
     let mut origin = 0;
     if padded {
         (samples, origin) = (samples.padded(), 1);
     }
     let grid = BitGrid::from_samples(samples, 0.0).expect("it is small");
-    for point in points(grid.shape()) {
+    for point in points(grid.shape().size()) {
         let weight = weights[shape.index(point.map(|v| v + origin))];
         assert_eq!(grid.get(point), weight < W::from_voxels(0.0), "at {point:?}");
     }
@@ -59,17 +47,17 @@ proptest! {
 
     #[test]
     fn bits_are_where_they_were_put(shape in shapes(), seed: u64) {
-        let is_set = |point| coin(seed, point) & 1 == 1;
+        let is_set = |point| random(seed, point) & 1 == 1;
         let grid = BitGrid::from_fn(shape, is_set).unwrap();
-        let expected: Vec<_> = points(shape).filter(|&point| is_set(point)).collect();
+        let expected: Vec<_> = points(shape.size()).filter(|&point| is_set(point)).collect();
         prop_assert_eq!(grid.count(), expected.len());
         prop_assert!(grid.iter().eq(expected.iter().copied()));
-        prop_assert!(points(shape).all(|point| grid.get(point) == is_set(point)));
+        prop_assert!(points(shape.size()).all(|point| grid.get(point) == is_set(point)));
         let mut built = BitGrid::new(shape).unwrap();
         prop_assert!(built.is_empty());
         let mut cleared = BitGrid::filled(shape, true).unwrap();
         prop_assert_eq!(cleared.count(), shape.len());
-        for point in points(shape) {
+        for point in points(shape.size()) {
             if is_set(point) {
                 built.set(point, true).unwrap();
             } else {

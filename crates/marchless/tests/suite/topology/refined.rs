@@ -8,7 +8,7 @@
 
 use std::collections::HashMap;
 
-use crate::{
+use super::{
     disjoint::Disjoint,
     pieces::{LatticeEdge, Piece, in_order},
 };

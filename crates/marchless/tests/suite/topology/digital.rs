@@ -6,7 +6,7 @@
 //! inside but for two opposite corners: its six other corners form a ring of edges without a square, and it is filled.
 //! The boundary of a body in space has twice the body's Euler number, and n closed surfaces cut space into n + 1 parts.
 
-use crate::disjoint::Disjoint;
+use super::disjoint::Disjoint;
 
 /// Lattice points, the outermost of which are outside.
 #[derive(Clone, Debug)]

@@ -1,14 +1,12 @@
 //! The mesher against a plain marching cubes that goes from cell to cell: the same triangles in the same order, of
 //! vertices in the same places.
 
-#[path = "support/fields.rs"]
-mod fields;
-
 use std::collections::HashMap;
 
-use fields::{Field, TestWeight};
 use marchless::{CaseIndex, MeshBuffer, MeshSettings, Mesher, Weight};
 use proptest::prelude::*;
+
+use crate::support::{Field, TestWeight};
 
 /// Where a vertex lies: on the edge from a meshed sample along an axis.
 type LatticeEdge = ([u32; 3], usize);

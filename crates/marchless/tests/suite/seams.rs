@@ -1,15 +1,14 @@
 //! Chunks' meshes fit: equal vertices on every shared border, bit for bit, and closed together.
 
-extern crate alloc;
-
-use alloc::collections::BTreeMap;
 use core::fmt::Debug;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use marchless::{
     Block, Chunk, ChunkSamples, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Topology, Voxel, Weight,
 };
 use proptest::prelude::*;
+
+use crate::support::random;
 
 /// How the samples of a random grid are made.
 #[derive(Clone, Copy, Debug)]
@@ -24,61 +23,55 @@ enum Field {
     Uniform,
 }
 
-trait Random: Weight + Debug {
-    fn random(bits: u64) -> Self;
+/// Weights that random bits make.
+trait AnyWeight: Weight + Debug {
+    fn any(bits: u64) -> Self;
 }
 
-impl Random for i8 {
-    fn random(bits: u64) -> Self {
+impl AnyWeight for i8 {
+    fn any(bits: u64) -> Self {
         bits as i8
     }
 }
 
-impl Random for i16 {
-    fn random(bits: u64) -> Self {
+impl AnyWeight for i16 {
+    fn any(bits: u64) -> Self {
         bits as i16
     }
 }
 
-impl Random for f32 {
-    fn random(bits: u64) -> Self {
+impl AnyWeight for f32 {
+    fn any(bits: u64) -> Self {
         f32::from_bits(bits as u32)
     }
 }
 
-fn hash(seed: u64, point: [i32; 3]) -> u64 {
-    point.iter().fold(seed, |hash, &v| {
-        let mixed = (hash ^ v as u32 as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) ^ mixed >> 32
-    })
-}
-
-fn chunk<W: Random>(field: Field, seed: u64, region: Region) -> Chunk<W> {
+fn chunk<W: AnyWeight>(field: Field, seed: u64, region: Region) -> Chunk<W> {
     let weight = |point: [i32; 3]| {
-        let bits = hash(seed, point);
+        let bits = random(seed, point);
         let [x, y, z] = point.map(|v| v as f32);
         let scale = 1.0 + (seed % 7) as f32;
         match field {
-            Field::Noise => W::random(bits),
+            Field::Noise => W::any(bits),
             Field::Steps => W::from_voxels((bits % 5) as f32 / 4.0 - 0.5),
             _ => W::from_voxels((x / scale).sin() * 3.0 + (y / 3.0).cos() * 2.0 + (z / (scale + 1.0)).sin() * 3.0),
         }
     };
     if let Field::Uniform = field {
-        let inside = hash(seed, region.min) % 3 < 2;
+        let inside = random(seed, region.min) % 3 < 2;
         return Chunk::Uniform(Voxel::new(if inside { W::INSIDE } else { W::OUTSIDE }, inside as u8));
     }
     let weights = region.points().map(weight).collect();
-    let materials = region.points().map(|point| (hash(seed, point) >> 40) as u8).collect();
+    let materials = region.points().map(|point| (random(seed, point) >> 40) as u8).collect();
     Chunk::Samples(ChunkSamples { weights, materials }.into())
 }
 
-fn grid<W: Random>(field: Field, seed: u64, cells: u32, bounds: Region) -> Grid<W> {
+fn grid<W: AnyWeight>(field: Field, seed: u64, cells: u32, bounds: Region) -> Grid<W> {
     let mut grid = Grid::bounded(cells, bounds).expect("a sound size");
     for position in bounds.points() {
         // Some chunks are absent, and some whole ones stand between sampled ones.
-        let field = if hash(seed, position) % 5 == 1 { Field::Uniform } else { field };
-        if hash(seed, position) % 7 != 2 {
+        let field = if random(seed, position) % 5 == 1 { Field::Uniform } else { field };
+        if random(seed, position) % 7 != 2 {
             grid.insert(position, chunk(field, seed, grid.chunk_region(position))).expect("within the bounds");
         }
     }
@@ -93,7 +86,7 @@ fn key(origin: [i32; 3], position: [f32; 3]) -> Key {
     core::array::from_fn(|axis| (f64::from(origin[axis]) + f64::from(position[axis]) + 0.0).to_bits())
 }
 
-fn meshes<W: Random>(grid: &Grid<W>, settings: &MeshSettings) -> BTreeMap<[i32; 3], MeshBuffer> {
+fn meshes<W: AnyWeight>(grid: &Grid<W>, settings: &MeshSettings) -> BTreeMap<[i32; 3], MeshBuffer> {
     let (mut mesher, mut block) = (Mesher::new(), Block::new());
     let mesh = |position| {
         let mut mesh = MeshBuffer::new();
@@ -125,7 +118,7 @@ fn border<W: Weight>(
         .collect()
 }
 
-fn check_seams<W: Random>(
+fn check_seams<W: AnyWeight>(
     field: Field,
     seed: u64,
     cells: u32,

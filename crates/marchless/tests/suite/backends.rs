@@ -1,17 +1,15 @@
 //! However a mesh is made, it is the same mesh, byte for byte: on every backend, slab by slab, and on any number of
 //! threads.
 
-#[path = "support/fields.rs"]
-mod fields;
-
 #[cfg(feature = "std")]
 use std::num::NonZero;
 
-use fields::{Field, TestWeight};
 #[cfg(feature = "std")]
 use marchless::ThreadedMesher;
 use marchless::{Backend, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher, Topology};
 use proptest::prelude::*;
+
+use crate::support::{Field, TestWeight};
 
 /// A mesh down to the last bit, signs of zeros and all.
 #[derive(Debug, PartialEq)]

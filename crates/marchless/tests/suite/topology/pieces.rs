@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use marchless::MeshBuffer;
 
-use crate::disjoint::Disjoint;
+use super::disjoint::Disjoint;
 
 /// An edge of the lattice: the sample at its lower end, and its axis.
 pub(crate) type LatticeEdge = ([u32; 3], usize);

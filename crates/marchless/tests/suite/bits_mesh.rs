@@ -8,6 +8,8 @@ use marchless::{
 };
 use proptest::{collection::vec, prelude::*, sample::select};
 
+use crate::support::{points, random};
+
 /// Small boxes, and rows of about one word or two along any axis.
 fn shapes() -> impl Strategy<Value = Shape> {
     let long = (select(&[2, 31, 32, 33, 63, 64, 65, 127, 130][..]), 2..5u32, 2..5u32, 0..3usize);
@@ -17,20 +19,6 @@ fn shapes() -> impl Strategy<Value = Shape> {
         size
     });
     prop_oneof![long, [2..7u32, 2..7u32, 2..7u32]].prop_map(|size| Shape::new(size).expect("no size is 0"))
-}
-
-fn points(shape: Shape) -> impl Iterator<Item = [u32; 3]> {
-    let [nx, ny, nz] = shape.size();
-    (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
-}
-
-/// A number for each point.
-fn hash(seed: u64, [x, y, z]: [u32; 3]) -> u64 {
-    let mut hash = seed ^ u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z);
-    for _ in 0..2 {
-        hash = (hash ^ hash >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-    hash ^ hash >> 29
 }
 
 fn is_on_border(shape: Shape, point: [u32; 3]) -> bool {
@@ -58,7 +46,7 @@ impl Noise {
     }
 
     fn is_set(&self, point: [u32; 3]) -> bool {
-        hash(self.seed, point) % 8 < self.density && !(self.enclosed && is_on_border(self.shape, point))
+        random(self.seed, point) % 8 < self.density && !(self.enclosed && is_on_border(self.shape, point))
     }
 
     fn grid(&self) -> BitGrid {
@@ -68,7 +56,7 @@ impl Noise {
 
 /// The two ends of each edge of the lattice.
 fn edges(shape: Shape) -> impl Iterator<Item = [[u32; 3]; 2]> {
-    points(shape).flat_map(move |low| {
+    points(shape.size()).flat_map(move |low| {
         (0..3).filter_map(move |axis| {
             let mut high = low;
             high[axis] += 1;
@@ -120,7 +108,7 @@ proptest! {
         let (mut plain, settings) = (BitMesher::without_normals(), MeshSettings::default());
         let (mut mesh, mut expected) = (MeshBuffer::new(), MeshBuffer::new());
         for noise in noises {
-            let weights: Vec<_> = points(noise.shape).map(|p| if noise.is_set(p) { -1.0f32 } else { 1.0 }).collect();
+            let weights: Vec<_> = points(noise.shape.size()).map(|p| if noise.is_set(p) { -1.0f32 } else { 1.0 }).collect();
             let samples = Samples::new(noise.shape, &weights).unwrap();
             mesher.mesh(samples, &settings, &mut expected).unwrap();
             bit_mesher.mesh(&noise.grid(), &mut mesh).unwrap();
@@ -167,7 +155,7 @@ impl Function {
         let phase = (seed % 64) as f32 / 10.0;
         let waves =
             (x * 0.7 + phase).sin() + (y * 0.9 - phase).sin() * (z * 0.6).cos() + 0.3 * (z - x * 0.5 + y * 0.2).sin();
-        let wild = hash(seed, position.map(f32::to_bits));
+        let wild = random(seed, position.map(f32::to_bits));
         match self {
             Self::Waves => waves,
             Self::Scaled(scale) => waves * scale,
@@ -255,7 +243,7 @@ proptest! {
         let sphere = |p| from_center(p).iter().map(|v| v * v).sum::<f32>().sqrt() - radius;
         let plane = |p| (0..3).map(|axis| from_center(p)[axis] * slope[axis] / length).sum::<f32>();
         for (function, is_plane) in [(&sphere as &dyn Fn([f32; 3]) -> f32, false), (&plane, true)] {
-            let weights: Vec<f32> = points(shape).map(|point| function(point.map(|v| v as f32))).collect();
+            let weights: Vec<f32> = points(shape.size()).map(|point| function(point.map(|v| v as f32))).collect();
             let samples = Samples::new(shape, &weights).unwrap();
             let (mut mesh, mut expected_mesh) = (MeshBuffer::new(), MeshBuffer::new());
             Mesher::new().mesh(samples, &MeshSettings::default(), &mut expected_mesh).unwrap();
@@ -303,14 +291,14 @@ impl Mixture {
     }
 
     fn at(&self, point: [u32; 3]) -> u8 {
-        let hash = hash(self.seed, point);
+        let bits = random(self.seed, point);
         let count = self.materials.len() as u64;
-        let index = if self.seed.is_multiple_of(2) { (hash >> 8) % (1 + hash % count) } else { hash % count };
+        let index = if self.seed.is_multiple_of(2) { (bits >> 8) % (1 + bits % count) } else { bits % count };
         self.materials[index as usize]
     }
 
     fn grid(&self) -> MaterialGrid {
-        let materials: Vec<u8> = points(self.shape).map(|point| self.at(point)).collect();
+        let materials: Vec<u8> = points(self.shape.size()).map(|point| self.at(point)).collect();
         MaterialGrid::from_materials(self.shape, &materials, self.planes).expect("all of them fit")
     }
 
@@ -334,7 +322,7 @@ proptest! {
         let grid = mixture.grid();
         let mut built = MaterialGrid::new(mixture.shape, mixture.planes).unwrap();
         prop_assert_eq!((grid.shape(), grid.planes().len()), (mixture.shape, mixture.planes as usize));
-        for point in points(mixture.shape) {
+        for point in points(mixture.shape.size()) {
             prop_assert_eq!(grid.get(point), Some(mixture.at(point)));
             prop_assert_eq!(built.get(point), Some(0));
             built.set(point, mixture.materials[0]).unwrap();
@@ -350,8 +338,8 @@ proptest! {
         seed: u64,
         set in prop_oneof![vec(any::<u8>(), 0..6), vec(any::<u8>(), 0..400), (any::<u8>(), any::<u8>()).prop_map(|(a, b)| (a..b).collect())],
     ) {
-        let at = |point| (hash(seed, point) % (1 << planes)) as u8;
-        let materials: Vec<u8> = points(shape).map(at).collect();
+        let at = |point| (random(seed, point) % (1 << planes)) as u8;
+        let materials: Vec<u8> = points(shape.size()).map(at).collect();
         let grid = MaterialGrid::from_materials(shape, &materials, planes).unwrap();
         let expected = BitGrid::from_fn(shape, |point| set.contains(&at(point))).unwrap();
         prop_assert!(grid.select(set.iter().copied()) == expected);

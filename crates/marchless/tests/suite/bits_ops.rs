@@ -8,6 +8,8 @@ use marchless::{
 };
 use proptest::{prelude::*, sample::select};
 
+use crate::support::random;
+
 /// Sizes around those of words, four words, and rows that are treated in one, two and three parts.
 const SIZES: [u32; 14] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 320, 645, 1000];
 
@@ -43,21 +45,13 @@ impl Case {
     }
 
     fn grid(self) -> BitGrid {
-        BitGrid::from_fn(self.shape(), |p| coin(self.seed, p) % 8 < self.density).expect("it is small")
+        BitGrid::from_fn(self.shape(), |p| random(self.seed, p) % 8 < self.density).expect("it is small")
     }
 
     /// Another grid of the same size.
     fn other(self) -> BitGrid {
         Self { seed: !self.seed, density: 8 - self.density / 2, ..self }.grid()
     }
-}
-
-fn coin(seed: u64, [x, y, z]: [u32; 3]) -> u64 {
-    let mut hash = seed ^ u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z);
-    for _ in 0..2 {
-        hash = (hash ^ hash >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-    hash ^ hash >> 29
 }
 
 /// Offsets of a point or two, of about a word, up to the size, and of any size.
@@ -123,7 +117,7 @@ fn is_within(inner: &BitGrid, outer: &BitGrid) -> bool {
 
 /// A grid of the same shape with something in it, to be overwritten.
 fn used(grid: &BitGrid) -> BitGrid {
-    made(grid.shape(), |p| coin(7, p) & 1 == 1)
+    made(grid.shape(), |p| random(7, p) & 1 == 1)
 }
 
 fn changed(grid: &BitGrid, change: impl FnOnce(&mut BitGrid)) -> BitGrid {
@@ -293,8 +287,8 @@ fn an_automaton_knows_every_count() {
 
 #[test]
 fn what_cannot_be_is_a_typed_error_and_changes_nothing() {
-    let grid = made(Shape::new([5, 4, 3]).unwrap(), |p| coin(1, p) & 1 == 1);
-    let other = made(Shape::new([5, 3, 4]).unwrap(), |p| coin(2, p) & 1 == 1);
+    let grid = made(Shape::new([5, 4, 3]).unwrap(), |p| random(1, p) & 1 == 1);
+    let other = made(Shape::new([5, 3, 4]).unwrap(), |p| random(2, p) & 1 == 1);
     let rule = Rule::new(&[3], &[2, 3]).unwrap();
     let error = Err(BitsError::ShapesDiffer { expected: grid.shape(), found: other.shape() });
     for change in [BitGrid::and_with, BitGrid::or_with, BitGrid::xor_with, BitGrid::subtract, BitGrid::copy_from] {

@@ -2,15 +2,12 @@
 //! surface is closed but for its rim in the faces of the box, 2-manifold, consistently oriented and free of anything
 //! degenerate, in both topologies, whatever the values are that have these signs.
 
-#[path = "support/random.rs"]
-mod random;
-#[path = "support/small.rs"]
 mod small;
 
 use std::thread;
 
+use fastrand::Rng;
 use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Topology};
-use random::Random;
 use small::{Defect, SmallBox, SmallJudge};
 
 const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
@@ -35,22 +32,21 @@ enum Values {
 const VALUES: [Values; 6] = [Values::Ones, Values::Few, Values::Zeros, Values::Even, Values::Wide, Values::Extreme];
 
 impl Values {
-    fn value(self, inside: bool, random: &mut Random) -> f32 {
+    fn value(self, inside: bool, random: &mut Rng) -> f32 {
         let magnitude = match self {
             Self::Ones => 1.0,
-            Self::Few => (1 + random.below(3)) as f32,
+            Self::Few => f32::from(random.u8(1..=3)),
             Self::Zeros if inside => 1.0,
-            Self::Zeros => random.below(2) as f32,
-            Self::Even => (1.0 - random.unit()) as f32,
-            Self::Wide => f32::from_bits((random.bits() as u32 >> 1).clamp(0x006c_e3ee, 0x7e96_7699)),
+            Self::Zeros => f32::from(random.u8(..2)),
+            Self::Even => (1.0 - random.f64()) as f32,
+            Self::Wide => f32::from_bits((random.u32(..) >> 1).clamp(0x006c_e3ee, 0x7e96_7699)),
             Self::Extreme => {
                 let outside = [f32::NAN, f32::INFINITY, f32::MAX, 0.0, 1e-45, 1.0, -0.0];
                 let inside_or_outside = [f32::INFINITY, f32::MAX, 1e-45, 1.0, 1e-40, 3e38];
-                let choice = random.bits();
-                if inside || choice & 1 == 0 {
-                    inside_or_outside[(choice >> 32) as usize % 6]
+                if inside || random.bool() {
+                    inside_or_outside[random.usize(..inside_or_outside.len())]
                 } else {
-                    outside[(choice >> 32) as usize % 7]
+                    outside[random.usize(..outside.len())]
                 }
             }
         };
@@ -63,7 +59,7 @@ struct Bench {
     mesher: Mesher,
     mesh: MeshBuffer,
     judge: SmallJudge,
-    random: Random,
+    random: Rng,
     weights: [f32; 27],
     /// How many meshes were made, and the triangles of all.
     meshes: usize,
@@ -76,7 +72,7 @@ impl Bench {
             mesher: Mesher::new(),
             mesh: MeshBuffer::new(),
             judge: SmallJudge::new(),
-            random: Random::new(seed),
+            random: Rng::with_seed(seed),
             weights: [0.0; 27],
             meshes: 0,
             triangles: 0,
@@ -172,7 +168,7 @@ fn ten_million_patterns_of_2_by_2_by_2_cells_are_sound() {
     let checked = in_two_threads(|half| {
         let mut bench = Bench::new(seed + u64::from(half));
         for pattern in 0..5_000_000 {
-            let inside = bench.random.bits() as u32 & ((1 << 27) - 1);
+            let inside = bench.random.u32(..) & ((1 << 27) - 1);
             // Mostly those that make decisions; the last kinds take longest.
             let values = VALUES[if pattern % 8 == 0 { pattern / 8 % VALUES.len() } else { pattern % 4 }];
             bench.check(SmallBox { size: [3; 3], inside }, values);
@@ -203,8 +199,8 @@ fn the_triangles_of_a_cell_never_cross() {
 }
 
 /// Spoils a mesh in one of many ways.
-fn spoil(mesh: &mut MeshBuffer, random: &mut Random) {
-    let mut any = |len: usize| random.below(len as u64) as usize;
+fn spoil(mesh: &mut MeshBuffer, random: &mut Rng) {
+    let mut any = |len: usize| random.usize(..len);
     let (vertices, corners) = (mesh.positions.len(), mesh.indices.len());
     let (vertex, corner) = (any(vertices), any(corners));
     let first = corner / 3 * 3;
@@ -230,24 +226,30 @@ fn spoil(mesh: &mut MeshBuffer, random: &mut Random) {
     }
 }
 
-/// Meshes that the judge lets pass are clean in the long report too, whole and spoilt; so what it says counts.
+/// Meshes that the judge lets pass are clean in the long report too, whole and spoilt; so what it says counts. Of
+/// triangles that cross each other it knows nothing.
 #[test]
 fn the_judge_is_no_milder_than_the_report() {
     let mut bench = Bench::new(42);
     let (mut sound, mut spoilt) = (0, 0);
     for pattern in 0..6000 {
         let size = [[3, 3, 3], [2, 3, 3], [3, 2, 2], [2, 2, 2]][pattern % 4];
-        let inside = bench.random.bits() as u32 & ((1 << (size[0] * size[1] * size[2])) - 1);
+        let inside = bench.random.u32(..) & ((1 << (size[0] * size[1] * size[2])) - 1);
         let (small, values) = (SmallBox { size, inside }, VALUES[pattern % VALUES.len()]);
         bench.fill(small, values);
         bench.mesh(small, TOPOLOGIES[pattern / 4 % 2]);
         if bench.mesh.is_empty() {
             continue;
         }
-        if pattern % 3 > 0 {
+        let is_spoilt = pattern % 3 > 0;
+        if is_spoilt {
             spoil(&mut bench.mesh, &mut bench.random);
         }
-        let report = bench.report(small);
+        let mut report = bench.report(small);
+        if is_spoilt {
+            // Another diagonal may make triangles cross each other, which the judge leaves to the report.
+            report.crossing_triangles = 0;
+        }
         match bench.judge.judge(&bench.mesh, small, true) {
             Ok(found) => {
                 assert!(report.is_clean(), "{report}: {:?}", bench.mesh);
@@ -256,7 +258,7 @@ fn the_judge_is_no_milder_than_the_report() {
             }
             Err(Defect::TooManyVertices(_)) => {}
             Err(defect) => {
-                assert!(pattern % 3 > 0, "{defect:?}: {:?}", bench.mesh);
+                assert!(is_spoilt, "{defect:?}: {:?}", bench.mesh);
                 spoilt += 1;
             }
         }
