@@ -1,5 +1,6 @@
 //! A terrain that loads nothing for want of a viewer is reported, once and not too soon.
 
+#[path = "suite/common/mod.rs"]
 mod common;
 
 use bevy_app::App;

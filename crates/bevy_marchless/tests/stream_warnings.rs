@@ -1,5 +1,6 @@
 //! What is wrong is said once, in a sentence, and not in every update.
 
+#[path = "suite/common/mod.rs"]
 mod common;
 
 use std::time::Duration;

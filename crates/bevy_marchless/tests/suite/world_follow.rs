@@ -1,0 +1,405 @@
+//! A terrain follows its world file while the game runs, and stays as it is when the file is no good.
+
+use std::fs;
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, Once};
+
+use crate::common::*;
+use bevy_app::{App, TaskPoolPlugin};
+use bevy_asset::{AssetPlugin, AssetServer, Assets, Handle, LoadState};
+use bevy_ecs::prelude::*;
+use bevy_log::tracing_subscriber;
+use bevy_marchless::prelude::*;
+use bevy_marchless::world::{WorldHeightMap, WorldPlugin};
+use bevy_math::{IVec3, UVec3, Vec3};
+use bevy_mesh::MeshPlugin;
+use bevy_transform::TransformPlugin;
+use marchless::MeshBuffer;
+use tempfile::TempDir;
+
+/// A game whose assets lie in a folder of its own.
+struct Game {
+    app: App,
+    folder: TempDir,
+}
+
+impl Game {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut app = App::new();
+        let assets = AssetPlugin { file_path: folder.path().to_str().unwrap().to_owned(), ..AssetPlugin::default() };
+        app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, assets, MeshPlugin, MarchlessPlugins));
+        Self { app, folder }
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        fs::write(self.folder.path().join(name), bytes).unwrap();
+    }
+
+    fn server(&self) -> &AssetServer {
+        self.app.world().resource::<AssetServer>()
+    }
+
+    /// A terrain of a world file, loaded and drawn.
+    fn spawn(&mut self, name: &str) -> Entity {
+        let handle = self.server().load(name.to_owned());
+        let entity = self.app.world_mut().spawn(TerrainWorld(handle)).id();
+        self.loaded(entity);
+        entity
+    }
+
+    fn handle(&self, entity: Entity) -> Handle<WorldDescription> {
+        self.app.world().get::<TerrainWorld>(entity).unwrap().0.clone()
+    }
+
+    fn terrain(&self, entity: Entity) -> &Terrain {
+        self.app.world().get::<Terrain>(entity).unwrap()
+    }
+
+    /// Updates until the terrain's world is loaded, taken over and drawn.
+    fn loaded(&mut self, entity: Entity) {
+        let handle = self.handle(entity);
+        update_until(&mut self.app, |app| app.world().resource::<AssetServer>().is_loaded(&handle));
+        self.drawn(entity);
+    }
+
+    /// Updates until what has changed is drawn.
+    fn drawn(&mut self, entity: Entity) {
+        for _ in 0..3 {
+            self.app.update();
+        }
+        settle(&mut self.app, entity);
+    }
+
+    /// Writes the file anew, loads it again, and waits until `done`.
+    fn rewrite(&mut self, name: &str, bytes: impl AsRef<[u8]>, entity: Entity, done: impl Fn(&App) -> bool) {
+        self.write(name, bytes);
+        self.server().reload(name.to_owned());
+        update_until(&mut self.app, done);
+        self.drawn(entity);
+    }
+
+    /// Loads the file again and waits until that has failed and been told.
+    fn fail(&mut self, name: &str, bytes: impl AsRef<[u8]>, entity: Entity) {
+        let before = warnings(name).len();
+        let handle = self.handle(entity);
+        self.rewrite(name, bytes, entity, |app| {
+            matches!(app.world().resource::<AssetServer>().load_state(&handle), LoadState::Failed(_))
+                && warnings(name).len() > before
+        });
+        // A second attempt of the same reload may come later.
+        for _ in 0..100 {
+            self.app.update();
+            std::thread::sleep(std::time::Duration::from_micros(500));
+        }
+        assert_eq!(warnings(name).len(), before + 1, "{:?}", warnings(name));
+    }
+
+    fn geometry(&mut self, entity: Entity) -> Vec<(IVec3, Arc<MeshBuffer>)> {
+        geometry(&mut self.app, entity)
+    }
+
+    fn dig(&mut self, entity: Entity) {
+        self.app.world_mut().write_message(Stamp::dig(entity, BrushShape::sphere(Vec3::splat(16.0), 6.0)));
+        self.app.update();
+        self.drawn(entity);
+    }
+}
+
+/// What the module of worlds has warned of about a file, a line each.
+fn warnings(name: &str) -> Vec<String> {
+    static TEXT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+    static START: Once = Once::new();
+    struct Log;
+    impl Write for Log {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            TEXT.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    START.call_once(|| {
+        let log = tracing_subscriber::fmt().with_ansi(false).with_writer(|| Log);
+        log.with_max_level(tracing_subscriber::filter::LevelFilter::WARN).init();
+    });
+    let text = String::from_utf8_lossy(&TEXT.lock().unwrap()).into_owned();
+    let of_file = text.lines().filter(|line| line.contains("WARN bevy_marchless::world") && line.contains(name));
+    of_file.map(str::to_owned).collect()
+}
+
+/// A ball in 2 × 2 × 2 chunks.
+fn ball_text(radius: f64, more: &str) -> String {
+    format!(
+        "(source: Sdf(Sphere(center: (30, 30, 30), radius: {radius})), extent: (x: (0, 2), y: (0, 2), z: (0, 2)), {more})"
+    )
+}
+
+#[test]
+fn a_world_is_loaded_and_followed() {
+    let mut game = Game::new();
+    let name = "followed.world.ron";
+    game.write(name, ball_text(10.0, "voxel_size: 1.0"));
+    let entity = game.spawn(name);
+    assert_eq!(game.terrain(entity).extent, UVec3::splat(2).into());
+    let small = game.geometry(entity);
+    assert!(small.iter().any(|(_, mesh)| !mesh.is_empty()));
+    assert_drawn(&mut game.app, entity);
+
+    let source = game.terrain(entity).source.clone();
+    game.rewrite(name, ball_text(12.0, "voxel_size: 1.0"), entity, |app| {
+        app.world().get::<Terrain>(entity).unwrap().source != source
+    });
+    assert_ne!(game.geometry(entity), small);
+    assert_drawn(&mut game.app, entity);
+
+    game.rewrite(name, ball_text(10.0, "voxel_size: 2.0"), entity, |app| {
+        app.world().get::<Terrain>(entity).unwrap().voxel_size == 2.0
+    });
+    assert_drawn(&mut game.app, entity);
+    assert!(warnings(name).is_empty());
+}
+
+#[test]
+fn only_what_differs_changes() {
+    let mut game = Game::new();
+    let name = "palette.world.ron";
+    game.write(name, ball_text(12.0, ""));
+    let entity = game.spawn(name);
+    game.dig(entity);
+    let dug = game.geometry(entity);
+    let source = game.terrain(entity).source.clone();
+
+    let palette = "palette: (colors: [Srgba(red: 1.0, green: 0.0, blue: 0.0, alpha: 1.0)])";
+    game.rewrite(name, ball_text(12.0, palette), entity, |app| {
+        app.world().get::<Terrain>(entity).unwrap().palette.colors.len() == 1
+    });
+    assert!(game.terrain(entity).source == source, "the source is the same");
+    let positions =
+        |chunks: &[(IVec3, Arc<MeshBuffer>)]| chunks.iter().map(|(_, mesh)| mesh.positions.clone()).collect::<Vec<_>>();
+    assert_eq!(positions(&game.geometry(entity)), positions(&dug), "what was dug stays");
+
+    // The same world in other words, and by hand what the file does not change.
+    game.app.world_mut().get_mut::<Terrain>(entity).unwrap().voxel_size = 3.0;
+    game.drawn(entity);
+    game.dig(entity);
+    let dug = game.geometry(entity);
+    let again = format!("// Another text.\n{}", ball_text(12.0, palette));
+    game.write(name, &again);
+    let mut reader =
+        game.app.world().resource::<Messages<bevy_asset::AssetEvent<WorldDescription>>>().get_cursor_current();
+    game.server().reload(name);
+    let reader = Mutex::new(&mut reader);
+    update_until(&mut game.app, |app| {
+        let events = app.world().resource::<Messages<bevy_asset::AssetEvent<WorldDescription>>>();
+        reader.lock().unwrap().read(events).next().is_some()
+    });
+    game.drawn(entity);
+    assert!(game.terrain(entity).source == source);
+    assert_eq!(game.terrain(entity).voxel_size, 3.0);
+    assert_eq!(game.geometry(entity), dug);
+}
+
+#[test]
+fn a_file_that_is_no_good_changes_nothing_and_is_told_once() {
+    let mut game = Game::new();
+    let name = "broken.world.ron";
+    let good = ball_text(12.0, "");
+    game.write(name, &good);
+    warnings(name);
+    let entity = game.spawn(name);
+    game.dig(entity);
+    let dug = game.geometry(entity);
+
+    game.fail(name, &good[..good.len() / 2], entity);
+    assert!(warnings(name)[0].contains("cut short"), "{:?}", warnings(name));
+    assert_eq!(game.geometry(entity), dug);
+    game.dig(entity);
+    let dug = game.geometry(entity);
+
+    game.fail(name, "(source: Sdf(Sphere(center: (0, 0, 0), radius: -1)))", entity);
+    assert!(warnings(name)[1].contains("line 1: a sphere's radius"), "{:?}", warnings(name));
+    game.fail(name, [0xff, 0xfe, 0], entity);
+    game.fail(name, "", entity);
+    assert_eq!(game.geometry(entity), dug, "nothing is lost");
+
+    // Repaired: the same world as before.
+    game.rewrite(name, &good, entity, |app| {
+        app.world().resource::<AssetServer>().is_loaded(&app.world().get::<TerrainWorld>(entity).unwrap().0)
+    });
+    assert_eq!(game.geometry(entity), dug);
+    // And changed, and broken in the way that was told before.
+    let source = game.terrain(entity).source.clone();
+    game.rewrite(name, ball_text(10.0, ""), entity, |app| app.world().get::<Terrain>(entity).unwrap().source != source);
+    assert_ne!(game.geometry(entity), dug);
+    game.fail(name, "", entity);
+    assert_eq!(warnings(name).len(), 5);
+}
+
+#[test]
+fn a_file_that_is_not_there_is_told_and_may_come_later() {
+    let mut game = Game::new();
+    let name = "late.world.ron";
+    warnings(name);
+    let handle = game.server().load(name);
+    let entity = game.app.world_mut().spawn((ground(), TerrainWorld(handle))).id();
+    settle(&mut game.app, entity);
+    update_until(&mut game.app, |_| !warnings(name).is_empty());
+    assert_drawn(&mut game.app, entity);
+    assert_eq!(game.terrain(entity).chunk_cells, 16);
+    game.rewrite(name, ball_text(10.0, ""), entity, |app| {
+        app.world().get::<Terrain>(entity).unwrap().extent == UVec3::splat(2).into()
+            && app.world().resource::<Assets<WorldDescription>>().len() == 1
+    });
+    assert_eq!(game.terrain(entity).chunk_cells, 16, "what a world does not say stays");
+    assert_drawn(&mut game.app, entity);
+    assert_eq!(warnings(name).len(), 1);
+}
+
+#[test]
+fn a_terrain_outlives_its_world() {
+    let mut game = Game::new();
+    let name = "gone.world.ron";
+    game.write(name, ball_text(12.0, ""));
+    let entity = game.spawn(name);
+    let other = game.spawn(name);
+    game.dig(entity);
+    let dug = game.geometry(entity);
+    let handle = game.handle(entity);
+    game.app.world_mut().resource_mut::<Assets<WorldDescription>>().remove(&handle);
+    game.drawn(entity);
+    assert_eq!(game.geometry(entity), dug);
+    game.app.world_mut().despawn(other);
+    game.app.world_mut().entity_mut(entity).remove::<TerrainWorld>();
+    drop(handle);
+    game.drawn(entity);
+    assert_eq!(game.app.world().resource::<Assets<WorldDescription>>().len(), 0);
+    assert_eq!(game.geometry(entity), dug);
+    assert!(warnings(name).is_empty());
+}
+
+#[test]
+fn worlds_can_be_changed_in_code() {
+    let mut game = Game::new();
+    let mut world = WorldDescription::from_ron(&ball_text(12.0, "")).unwrap();
+    let handle = game.app.world_mut().resource_mut::<Assets<WorldDescription>>().add(world.clone());
+    let entity = game.app.world_mut().spawn(TerrainWorld(handle.clone())).id();
+    game.drawn(entity);
+    assert_drawn(&mut game.app, entity);
+    let before = game.geometry(entity);
+    assert!(before.iter().any(|(_, mesh)| !mesh.is_empty()));
+
+    let change = |game: &mut Game, world: &WorldDescription| {
+        let mut worlds = game.app.world_mut().resource_mut::<Assets<WorldDescription>>();
+        *worlds.get_mut(&handle).unwrap() = world.clone();
+        drop(worlds);
+        game.drawn(entity);
+    };
+    warnings("code");
+    world.source = WorldSource::Sdf(Sdf::sphere([30.0; 3], f64::NAN));
+    change(&mut game, &world);
+    world.source = WorldSource::HeightMap(WorldHeightMap {
+        picture: "code.png".into(),
+        settings: HeightMapSettings::default(),
+        map: None,
+    });
+    change(&mut game, &world);
+    assert_eq!(warnings("code.png").len(), 1);
+    assert_eq!(game.geometry(entity), before, "a bad world changes nothing");
+    world.source = WorldSource::Air;
+    change(&mut game, &world);
+    assert!(game.geometry(entity).iter().all(|(_, mesh)| mesh.is_empty()));
+}
+
+#[test]
+fn a_height_map_is_read_with_its_world() {
+    let mut game = Game::new();
+    let name = "map.world.ron";
+    let text = "(source: HeightMap(picture: \"heights.png\", settings: (metres_per_unit: 0.001, floor: 20.0)),
+        extent: (x: (0, 1), y: (0, 2), z: (0, 1)))";
+    warnings(name);
+    game.write(name, text);
+    game.write("heights.png", grey_png(16, 16, |x, z| (x * z * 100) as u16));
+    let entity = game.spawn(name);
+    assert_drawn(&mut game.app, entity);
+    let before = game.geometry(entity);
+    assert!(before.iter().any(|(_, mesh)| !mesh.is_empty()));
+
+    // The world's text is the same, the picture is not.
+    let source = game.terrain(entity).source.clone();
+    game.write("heights.png", grey_png(16, 16, |x, z| ((x + z) * 400) as u16));
+    game.rewrite(name, text, entity, |app| app.world().get::<Terrain>(entity).unwrap().source != source);
+    let changed = game.geometry(entity);
+    assert_ne!(changed, before);
+
+    let picture = grey_png(16, 16, |_, _| 1);
+    game.write("heights.png", &picture[..picture.len() / 2]);
+    game.fail(name, text, entity);
+    assert!(warnings(name)[0].contains("heights.png"), "{:?}", warnings(name));
+    assert_eq!(game.geometry(entity), changed);
+}
+
+/// A 16-bit greyscale PNG picture.
+fn grey_png(width: u32, height: u32, sample: impl Fn(u32, u32) -> u16) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let samples: Vec<u8> = (0..height)
+        .flat_map(|z| (0..width).map(move |x| (x, z)))
+        .flat_map(|(x, z)| sample(x, z).to_be_bytes())
+        .collect();
+    encoder.write_header().unwrap().write_image_data(&samples).unwrap();
+    bytes
+}
+
+#[test]
+fn the_plugin_does_nothing_without_assets_and_may_come_before_them() {
+    let mut app = bare_app();
+    let entity = app.world_mut().spawn((ground(), TerrainWorld::default())).id();
+    settle(&mut app, entity);
+    let mut app = App::new();
+    app.add_plugins(WorldPlugin);
+    app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default()));
+    app.finish();
+    assert!(app.world().contains_resource::<Assets<WorldDescription>>());
+}
+
+#[test]
+fn stamps_wait_for_a_world_that_is_being_read() {
+    let world = WorldDescription::new(WorldSource::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
+    let world = WorldDescription { extent: UVec3::splat(2).into(), ..world };
+    let mut game = Game::new();
+    game.write("a.world.ron", world.to_ron().unwrap());
+    game.write("bad.world.ron", "(");
+    let at = Vec3::new(20.0, 14.0, 20.0);
+    let dig = |terrain| Stamp::dig(terrain, BrushShape::sphere(at, 5.0));
+    // A new terrain, and one that is to become another.
+    let former = game.app.world_mut().spawn(ground_of_rock()).id();
+    settle(&mut game.app, former);
+    for entity in [game.app.world_mut().spawn_empty().id(), former] {
+        let handle = game.server().load("a.world.ron");
+        game.app.world_mut().entity_mut(entity).insert(TerrainWorld(handle));
+        game.app.world_mut().write_message(dig(entity));
+        game.app.update();
+        assert!(!volume(&game.app, entity).is_settled());
+        game.loaded(entity);
+        assert_as_new(&mut game.app, entity, &[dig(entity)]);
+    }
+    // A file that is no good makes nobody wait for ever, nor does one that is taken away.
+    let handle = game.server().load("bad.world.ron");
+    game.app.world_mut().entity_mut(former).insert(TerrainWorld(handle));
+    game.app.world_mut().write_message(Stamp::add(former, BrushShape::sphere(at, 5.0), 2));
+    update_until(&mut game.app, |app| volume(app, former).is_settled());
+    assert_as_new(&mut game.app, former, &[dig(former), Stamp::add(former, BrushShape::sphere(at, 5.0), 2)]);
+    let handle = game.server().load("b.world.ron");
+    game.app.world_mut().entity_mut(former).insert(TerrainWorld(handle)).remove::<TerrainWorld>();
+    game.app.world_mut().write_message(dig(former));
+    update_until(&mut game.app, |app| volume(app, former).is_settled());
+}
+
+/// All rock.
+fn ground_of_rock() -> Terrain {
+    small(Terrain::new(|_: [f64; 3]| -9.0))
+}
