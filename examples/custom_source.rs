@@ -6,6 +6,7 @@
 
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use marchless_examples::camera::fly_camera;
 use marchless_examples::small::sun;
 

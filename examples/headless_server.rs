@@ -6,6 +6,7 @@
 use bevy::prelude::*;
 use bevy_marchless::marchless::{Grid, MeshReport};
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use core::fmt;
 use core::time::Duration;
 use std::time::Instant;

@@ -6,6 +6,7 @@
 use bevy::input::common_conditions::input_just_pressed;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use marchless_examples::camera::{fly_camera, mouse_is_grabbed};
 use marchless_examples::small::sun;
 

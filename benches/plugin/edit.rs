@@ -12,6 +12,7 @@ use bevy_app::{App, TaskPoolPlugin};
 use bevy_asset::AssetPlugin;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use bevy_math::Vec3;
 use bevy_mesh::{Mesh3d, MeshPlugin};
 use bevy_transform::{TransformPlugin, components::Transform};

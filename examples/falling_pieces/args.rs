@@ -32,7 +32,7 @@ pub(crate) struct Args {
 pub(crate) enum Moment {
     /// Before the stem is cut.
     Before,
-    /// While the piece falls.
+    /// While the island falls.
     Falling,
     /// Once it has come to rest.
     Rest,

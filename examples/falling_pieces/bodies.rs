@@ -1,9 +1,10 @@
-//! [`Body`]: a piece of the terrain that hangs free becomes one, falls and comes to rest. No physics engine: bits collide.
+//! [`Body`]: a island of the terrain that hangs free becomes one, falls and comes to rest. No physics engine: bits collide.
 
 use bevy::prelude::*;
+use bevy_marchless::bits::prelude::*;
 use bevy_marchless::prelude::*;
 
-/// A piece that has left the terrain. It falls by whole steps of the lattice as far as collisions go, and smoothly as far as
+/// A island that has left the terrain. It falls by whole steps of the lattice as far as collisions go, and smoothly as far as
 /// one sees.
 #[derive(Component)]
 pub(crate) struct Body {
@@ -23,17 +24,17 @@ pub(crate) struct Body {
 
 /// [Units: voxels per second²]
 const GRAVITY: f32 = 40.0;
-/// Smaller pieces are dug out, but become no bodies. [Units: cubic voxels]
+/// Smaller islands are dug out, but become no bodies. [Units: cubic voxels]
 const DUST: usize = 12;
-/// How far around an edit pieces are looked for: the whole terrain, since it is small. In a larger one, a snapshot's box
+/// How far around an edit islands are looked for: the whole terrain, since it is small. In a larger one, a snapshot's box
 /// would be searched in a task. [Units: voxels]
 const MARGIN: u32 = 128;
 /// Who falls so far has missed the terrain. [Units: voxels]
 const ABYSS: f32 = 300.0;
 
 pub(crate) fn plugin(app: &mut App) {
-    // All that an update changes shows in it, so that no piece is missing or doubled for a moment.
-    app.insert_resource(MarchlessSettings { inline_chunks: 64, ..default() })
+    // All that an update changes shows in it, so that no island is missing or doubled for a moment.
+    app.insert_resource(MarchlessSettings { max_inline_chunks: 64, ..default() })
         .add_systems(Update, (fall, free_pieces).chain());
 }
 
@@ -45,22 +46,22 @@ fn free_pieces(
     mut commands: Commands,
 ) {
     for edited in edits.read() {
-        let Ok(pieces) = bits.loose_pieces(edited, MARGIN) else { continue };
-        for piece in &pieces {
-            stamps.write_batch(piece.stamps(edited.terrain));
-            let Ok(samples) = bits.samples(edited.terrain, piece) else { continue };
-            if piece.size() < DUST {
+        let Ok(islands) = bits.loose_islands(edited, MARGIN) else { continue };
+        for island in &islands {
+            stamps.write_batch(island.stamps(edited.terrain));
+            let Ok(samples) = bits.samples(edited.terrain, island) else { continue };
+            if island.size() < DUST {
                 continue;
             }
-            println!("A piece of {} cubic voxels hangs free.", piece.size());
+            println!("A island of {} cubic voxels hangs free.", island.size());
             let body = Body {
                 terrain: edited.terrain,
-                bits: piece.bits(),
-                origin: piece.bounds().min.into(),
+                bits: island.bits(),
+                origin: island.bounds().min.into(),
                 fallen: 0.0,
                 speed: 0.0,
                 is_at_rest: false,
-                volume: piece.size(),
+                volume: island.size(),
             };
             // Its samples begin two voxels below its bounds. A voxel is a world unit.
             let place = Transform::from_translation((body.origin - 2).as_vec3());
@@ -94,7 +95,7 @@ fn fall(
 
         let Ok((_, mut body, mut transform)) = bodies.get_mut(entity) else { continue };
         if is_at_rest && !body.is_at_rest {
-            println!("The piece of {} cubic voxels is at rest, {steps} voxels below where it was.", body.volume);
+            println!("The island of {} cubic voxels is at rest, {steps} voxels below where it was.", body.volume);
         }
         if fallen > ABYSS {
             commands.entity(entity).despawn();

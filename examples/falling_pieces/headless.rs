@@ -15,9 +15,9 @@ use crate::scene;
 /// How long a step may take before something must be wrong.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Cuts the stem, and waits until the piece rests on the ground.
+/// Cuts the stem, and waits until the island rests on the ground.
 ///
-/// Success where it does, and the terrain has lost as much as the piece has.
+/// Success where it does, and the terrain has lost as much as the island has.
 pub(crate) fn run() -> ExitCode {
     match try_run() {
         Ok(()) => ExitCode::SUCCESS,
@@ -49,10 +49,10 @@ fn try_run() -> Result<(), String> {
     if volumes.is_empty() || volumes.iter().sum::<usize>() as u64 != dug {
         return Err(format!("the terrain has lost {dug} cubic voxels, but the bodies have {volumes:?}"));
     }
-    update_until(&mut app, "the piece does not come to rest", |world| bodies(world).all(|body| body.is_at_rest))?;
+    update_until(&mut app, "the island does not come to rest", |world| bodies(world).all(|body| body.is_at_rest))?;
     let falls: Vec<f32> = bodies(app.world_mut()).map(|body| body.fallen).collect();
     if falls.len() != volumes.len() || falls.iter().any(|fallen| *fallen < 1.0) {
-        return Err(format!("pieces have fallen by {falls:?} voxels"));
+        return Err(format!("islands have fallen by {falls:?} voxels"));
     }
     Ok(())
 }

@@ -1,11 +1,11 @@
-//! The text: keys, and the volume of each piece.
+//! The text: keys, and the volume of each island.
 
 use bevy::prelude::*;
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};
 
 use crate::bodies::Body;
 
-/// As many pieces have a line.
+/// As many islands have a line.
 const LINES: usize = 8;
 const KEYS: &str = "Click, then cut a stem or both legs of the gate: left button digs, WASD Space Shift fly, R anew, Esc frees the mouse";
 

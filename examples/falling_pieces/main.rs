@@ -1,10 +1,10 @@
 //! Dig through a pillar: what hangs free falls, as a body of its own, and comes to rest where it meets ground.
 //!
 //! Click to grab the mouse, Esc frees it. W, A, S, D, Space and Shift fly, Ctrl flies faster; the left button digs, R
-//! builds everything anew. Cut the mushroom's stem, or both legs of the gate. The text says how large each piece is.
+//! builds everything anew. Cut the mushroom's stem, or both legs of the gate. The text says how large each island is.
 //!
 //! `--screenshot` renders a picture without a window; without a display, or with `--headless`, the stem is cut by itself, and the
-//! piece's volume and way are printed. See `--help`.
+//! island's volume and way are printed. See `--help`.
 
 mod args;
 mod bodies;
@@ -18,6 +18,7 @@ use std::process::ExitCode;
 
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
+use bevy_marchless::material::TerrainMaterialPlugin;
 use bevy_marchless::prelude::*;
 use clap::Parser as _;
 use marchless_examples::camera::FlyCameraPlugin;
@@ -68,7 +69,7 @@ fn finish(mut app: App) -> ExitCode {
 }
 
 fn window_app(app: &mut App) {
-    app.add_plugins(window_plugins("Marchless: falling pieces")).add_plugins((
+    app.add_plugins(window_plugins("Marchless: falling islands")).add_plugins((
         EguiPlugin::default(),
         shown_plugin,
         FlyCameraPlugin,

@@ -1,4 +1,4 @@
-//! [`MomentPlugin`]: a picture before the stem is cut, while the piece falls, or once it has come to rest.
+//! [`MomentPlugin`]: a picture before the stem is cut, while the island falls, or once it has come to rest.
 
 use core::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::args::{Args, Moment};
 use crate::bodies::Body;
 use crate::scene;
 
-/// How far the piece has fallen when it is taken. [Units: voxels]
+/// How far the island has fallen when it is taken. [Units: voxels]
 const ON_ITS_WAY: f32 = 4.0;
 
 /// Renders the moment that the command line asks for.

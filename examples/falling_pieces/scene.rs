@@ -3,6 +3,7 @@
 use bevy::math::DVec3;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use marchless_examples::camera::fly_camera;
 use marchless_examples::look::{GROUND, Ground, LOOKS, ROCK, Scene};
 

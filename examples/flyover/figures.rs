@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use bevy::prelude::*;
-use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 
 /// What happened in the latest whole second.
 #[derive(Resource, Default)]

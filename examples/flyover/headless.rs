@@ -12,7 +12,10 @@ use bevy::diagnostic::{DiagnosticPath, DiagnosticsStore};
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::time::{TimePlugin, TimeUpdateStrategy};
+use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
+use bevy_marchless::stream::Coverage;
 
 use crate::args::Args;
 use crate::{BAD_INPUT, flight};
@@ -101,7 +104,7 @@ fn line(
         stats.unloaded - before.unloaded,
         stats.filled - before.filled,
         stats.meshed - before.meshed,
-        diagnostic(app, &DebugPlugin::RESIDENT_BYTES).unwrap_or(0.0),
+        diagnostic(app, &TerrainDiagnosticsPlugin::RESIDENT_BYTES).unwrap_or(0.0),
     )
 }
 
@@ -110,7 +113,7 @@ fn summary(app: &App, terrain: Entity, elapsed: Duration, mut times: Vec<Duratio
     let rank = |share: f64| milliseconds(times[((times.len() - 1) as f64 * share).round() as usize]);
     let stats = app.world().resource::<TerrainStats>();
     let coverage = coverage(app, terrain);
-    let bytes = diagnostic(app, &DebugPlugin::BYTES_PER_SURFACE_CHUNK);
+    let bytes = diagnostic(app, &TerrainDiagnosticsPlugin::BYTES_PER_SURFACE_CHUNK);
     format!(
         "{} updates in {:.1} s; main thread p50 {:.3} ms, p99 {:.3} ms, max {:.3} ms; {:.0} chunks meshed per second; \
          {} bytes per surface chunk; {:.1} % of {} fills empty; {} chunks drawn, {} waiting",

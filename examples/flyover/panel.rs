@@ -7,7 +7,9 @@ use bevy::prelude::*;
 use bevy::window::{CursorOptions, PrimaryWindow};
 use bevy_egui::input::egui_wants_any_keyboard_input;
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
+use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 use marchless_examples::camera::{FlyCamera, mouse_is_grabbed};
 
 use crate::figures::{self, PerSecond};
@@ -78,16 +80,16 @@ impl Panel<'_, '_> {
             row(ui, "position", &format!("{x:.0}, {y:.0}, {z:.0}"));
             for (name, value, decimals, unit) in [
                 ("frame time, mean", mean(&FrameTimeDiagnosticsPlugin::FRAME_TIME), 1, " ms"),
-                ("main thread, mean", mean(&DebugPlugin::MAIN_THREAD), 2, " ms"),
+                ("main thread, mean", mean(&TerrainDiagnosticsPlugin::MAIN_THREAD), 2, " ms"),
                 ("… at most, last second", Some(per_second.slowest.as_secs_f64() * 1e3), 2, " ms"),
-                ("chunks drawn", newest(&DebugPlugin::CHUNKS), 0, ""),
-                ("chunks waiting", newest(&DebugPlugin::WAITING_CHUNKS), 0, ""),
+                ("chunks drawn", newest(&TerrainDiagnosticsPlugin::CHUNKS), 0, ""),
+                ("chunks waiting", newest(&TerrainDiagnosticsPlugin::WAITING_CHUNKS), 0, ""),
                 ("loaded per second", Some(per_second.loaded as f64), 0, ""),
                 ("unloaded per second", Some(per_second.unloaded as f64), 0, ""),
                 ("meshed per second", Some(per_second.meshed as f64), 0, ""),
                 ("filled for nothing", share(self.stats.filled_empty, self.stats.filled), 1, " %"),
-                ("samples and meshes", newest(&DebugPlugin::RESIDENT_BYTES).map(mebibytes), 1, " MiB"),
-                ("triangles", newest(&DebugPlugin::TRIANGLES), 0, ""),
+                ("samples and meshes", newest(&TerrainDiagnosticsPlugin::RESIDENT_BYTES).map(mebibytes), 1, " MiB"),
+                ("triangles", newest(&TerrainDiagnosticsPlugin::TRIANGLES), 0, ""),
             ] {
                 row(ui, name, &value.map_or("–".to_owned(), |value| format!("{value:.decimals$}{unit}")));
             }

@@ -4,6 +4,7 @@ use core::ops::RangeInclusive;
 
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use marchless_examples::look::{Ground, LOOKS, ROCK, Scene};
 
 /// What the world is made of, and how far one sees.

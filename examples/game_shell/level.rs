@@ -5,6 +5,7 @@ use bevy::input::common_conditions::input_just_pressed;
 use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use marchless_examples::camera::fly_camera;
 
 use crate::layers;

@@ -20,6 +20,7 @@ use std::process::ExitCode;
 use bevy::diagnostic::FrameTimeDiagnosticsPlugin;
 use bevy::pbr::wireframe::WireframePlugin;
 use bevy::prelude::*;
+use bevy_marchless::material::TerrainMaterialPlugin;
 use bevy_marchless::prelude::*;
 use clap::Parser as _;
 use marchless_examples::camera::FlyCameraPlugin;

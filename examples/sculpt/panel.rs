@@ -6,6 +6,7 @@ use bevy::pbr::wireframe::WireframeConfig;
 use bevy::prelude::*;
 use bevy::window::{CursorOptions, PrimaryWindow};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
+use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
 use bevy_marchless::prelude::*;
 use marchless_examples::camera::mouse_is_grabbed;
 use marchless_examples::look::{LOOKS, MATERIALS};
@@ -112,15 +113,18 @@ impl Panel<'_> {
     fn figures(&self, ui: &mut egui::Ui) {
         let mean = |path: &DiagnosticPath| self.diagnostics.get(path).and_then(|diagnostic| diagnostic.average());
         let newest = |path: &DiagnosticPath| self.diagnostics.get(path).and_then(|diagnostic| diagnostic.value());
-        let waiting = [DebugPlugin::FILL_QUEUE, DebugPlugin::MESH_QUEUE].iter().filter_map(newest).sum();
+        let waiting = [TerrainDiagnosticsPlugin::FILL_QUEUE, TerrainDiagnosticsPlugin::MESH_QUEUE]
+            .iter()
+            .filter_map(newest)
+            .sum();
         egui::Grid::new("figures").num_columns(2).show(ui, |ui| {
             for (name, value, decimals, unit) in [
-                ("chunks", newest(&DebugPlugin::CHUNKS), 0, ""),
-                ("triangles", newest(&DebugPlugin::TRIANGLES), 0, ""),
+                ("chunks", newest(&TerrainDiagnosticsPlugin::CHUNKS), 0, ""),
+                ("triangles", newest(&TerrainDiagnosticsPlugin::TRIANGLES), 0, ""),
                 ("waiting", Some(waiting), 0, ""),
-                ("mesh time, mean", mean(&DebugPlugin::MESH_TIME), 2, " ms"),
-                ("edit to visible", newest(&DebugPlugin::EDIT_TIME), 2, " ms"),
-                ("… in updates", newest(&DebugPlugin::EDIT_UPDATES), 0, ""),
+                ("mesh time, mean", mean(&TerrainDiagnosticsPlugin::MESH_TIME), 2, " ms"),
+                ("edit to visible", newest(&TerrainDiagnosticsPlugin::EDIT_TIME), 2, " ms"),
+                ("… in updates", newest(&TerrainDiagnosticsPlugin::EDIT_UPDATES), 0, ""),
                 ("frame time, mean", mean(&FrameTimeDiagnosticsPlugin::FRAME_TIME), 1, " ms"),
             ] {
                 ui.label(name);

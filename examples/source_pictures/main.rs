@@ -15,6 +15,7 @@ use std::process::ExitCode;
 
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use clap::{Parser, ValueEnum};
 use marchless_examples::solid::Solid as Body;
 use marchless_examples::stage::{self, Failure, Prop, Stage};

@@ -2,6 +2,7 @@
 
 use bevy_ecs::system::SystemState;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use bevy_math::{Dir3, Ray3d, UVec3, Vec3};
 use marchless_plugin_benches::{Game, PACE};
 

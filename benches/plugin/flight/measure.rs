@@ -3,8 +3,10 @@
 use std::time::{Duration, Instant};
 
 use bevy_diagnostic::{DiagnosticPath, DiagnosticsStore};
-use bevy_marchless::marchless::Chunk;
+use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
+use bevy_marchless::marchless::GridChunk;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 use bevy_math::{IVec3, Vec3};
 use marchless_plugin_benches::{Game, PACE, Times, World, resident_bytes};
 
@@ -80,8 +82,8 @@ impl Flight {
             waiting,
             stats,
             time,
-            resident: diagnostic(&DebugPlugin::RESIDENT_BYTES),
-            per_surface_chunk: diagnostic(&DebugPlugin::BYTES_PER_SURFACE_CHUNK),
+            resident: diagnostic(&TerrainDiagnosticsPlugin::RESIDENT_BYTES),
+            per_surface_chunk: diagnostic(&TerrainDiagnosticsPlugin::BYTES_PER_SURFACE_CHUNK),
         }
     }
 }
@@ -123,8 +125,8 @@ pub(crate) fn long_flight(minutes: u32) -> String {
 fn edited_bytes(volume: &TerrainVolume) -> usize {
     let kept = volume.grid().chunks().filter(|(position, _)| volume.leaf_at(IVec3::from(*position)).is_none());
     kept.map(|(_, chunk)| match chunk {
-        Chunk::Uniform(_) => 0,
-        Chunk::Samples(samples) => 2 * samples.weights.len() + samples.materials.len(),
+        GridChunk::Uniform(_) => 0,
+        GridChunk::Samples(samples) => 2 * samples.weights.len() + samples.materials.len(),
     })
     .sum()
 }

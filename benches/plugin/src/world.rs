@@ -1,6 +1,7 @@
 //! [`World`]: what the benches' terrains are made of.
 
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 
 /// What an endless world is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! [`TerrainBits`]: what of a terrain is solid, as bits: collision, what hangs together, and what hangs free.
 
 mod cache;
+mod island;
 mod part;
-mod piece;
 mod snapshot;
 
 use bevy_app::{App, Plugin};
@@ -17,9 +17,16 @@ use crate::brush::TerrainEdited;
 use crate::mesh::ChunkSamples;
 use crate::terrain::{TerrainVolume, give_to_terrains};
 use cache::BitsCache;
-use part::{Ground, Part, parts, within};
-pub use piece::Piece;
+pub use island::Island;
+use part::{ChunkPart, SolidQuery, parts, within};
 pub use snapshot::BitsSnapshot;
+
+/// The questions about what is solid, and what answers are made of.
+pub mod prelude {
+    pub use super::{BitsSnapshot, Island, Phase, TerrainBits, TerrainBitsError};
+    pub use marchless::Region;
+    pub use marchless::bits::BitGrid;
+}
 
 /// Questions to terrains about what is solid: the lattice points whose samples are inside at the terrain's isovalue.
 ///
@@ -37,12 +44,13 @@ pub use snapshot::BitsSnapshot;
 /// To derive the bits of a chunk of 32³ samples takes about 20 µs, once. [`is_solid`](Self::is_solid) and the questions about what
 /// overlaps then take about a microsecond for each chunk they touch, and are meant for the main thread, hundreds
 /// of them an update. The others gather the bits of a box: on hills, [`bits`](Self::bits) stays under a millisecond up to
-/// 192³ points, [`connected`](Self::connected) and [`pieces`](Self::pieces) up to 128³ (measured on one server core); ground
+/// 192³ points, [`connected`](Self::connected) and [`islands`](Self::islands) up to 128³ (measured on one server core); ground
 /// full of holes takes longer. For larger boxes take a [`snapshot`](Self::snapshot), which takes microseconds, and ask it
 /// [in a task](BitsSnapshot::in_task).
 ///
 /// ```
 /// use bevy_marchless::prelude::*;
+/// use bevy_marchless::bits::prelude::*;
 /// # use bevy_ecs::prelude::*;
 /// # use bevy_math::Vec3;
 ///
@@ -70,7 +78,7 @@ impl Plugin for BitsPlugin {
 
 /// The medium that a path must stay inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Medium {
+pub enum Phase {
     /// What is solid.
     Solid,
     /// Everything else, the air beyond the terrain included.
@@ -87,11 +95,11 @@ impl TerrainBits<'_, '_> {
     /// # Errors
     /// [`TerrainBitsError::NoTerrain`], [`TerrainBitsError::NotFilled`].
     pub fn is_solid(&self, terrain: Entity, region: Region) -> Result<bool, TerrainBitsError> {
-        let ground = self.ground(terrain)?;
-        if region.is_empty() || within(ground.grid, region) != region {
+        let query = self.query(terrain)?;
+        if region.is_empty() || within(query.grid, region) != region {
             return Ok(region.is_empty());
         }
-        for part in parts(ground, region) {
+        for part in parts(query, region) {
             if !part?.is_solid()? {
                 return Ok(false);
             }
@@ -104,7 +112,7 @@ impl TerrainBits<'_, '_> {
     /// # Errors
     /// As [`TerrainBits::is_solid`].
     pub fn overlaps_region(&self, terrain: Entity, region: Region) -> Result<bool, TerrainBitsError> {
-        self.any_part(terrain, region, Part::is_partly_solid)
+        self.any_part(terrain, region, ChunkPart::is_partly_solid)
     }
 
     /// Whether some solid point is at most `radius` from `center`. What lies on the sphere but for the rounding of `f32` may
@@ -156,42 +164,42 @@ impl TerrainBits<'_, '_> {
         a: IVec3,
         b: IVec3,
         region: Region,
-        medium: Medium,
+        medium: Phase,
     ) -> Result<bool, TerrainBitsError> {
         self.snapshot(terrain, region)?.connected(a, b, medium)
     }
 
-    /// The pieces that what is solid in a box falls into: see [`BitsSnapshot::pieces`].
+    /// The islands that what is solid in a box falls into: see [`BitsSnapshot::islands`].
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`]; [`TerrainBitsError::TooLarge`].
-    pub fn pieces(&self, terrain: Entity, region: Region) -> Result<Vec<Piece>, TerrainBitsError> {
-        self.snapshot(terrain, region)?.pieces()
+    pub fn islands(&self, terrain: Entity, region: Region) -> Result<Vec<Island>, TerrainBitsError> {
+        self.snapshot(terrain, region)?.islands()
     }
 
-    /// The pieces that hang free near an edit, in a box that reaches `margin` points beyond what it has changed.
+    /// The islands that hang free near an edit, in a box that reaches `margin` points beyond what it has changed.
     ///
-    /// A piece is found only if all of it lies within that box, and not at its border; what hung free there before the
+    /// A island is found only if all of it lies within that box, and not at its border; what hung free there before the
     /// edit is found, too.
     ///
     /// # Errors
-    /// As [`TerrainBits::pieces`].
-    pub fn loose_pieces(&self, edited: &TerrainEdited, margin: u32) -> Result<Vec<Piece>, TerrainBitsError> {
+    /// As [`TerrainBits::islands`].
+    pub fn loose_islands(&self, edited: &TerrainEdited, margin: u32) -> Result<Vec<Island>, TerrainBitsError> {
         let region = Region::new(edited.min.to_array(), edited.max.to_array()).grown(margin, margin);
-        self.snapshot(edited.terrain, region)?.loose_pieces()
+        self.snapshot(edited.terrain, region)?.loose_islands()
     }
 
-    /// The samples of a piece alone, as they are now: put them on an entity, and it looks as it did in the terrain. The lowest
-    /// sample lies at two points below the piece's bounds, since there is air all around. Takes milliseconds for
+    /// The samples of a island alone, as they are now: put them on an entity, and it looks as it did in the terrain. The lowest
+    /// sample lies at two points below the island's bounds, since there is air all around. Takes milliseconds for
     /// bounds of 64³ points.
     ///
     /// # Errors
     /// [`TerrainBitsError::NoTerrain`].
-    pub fn samples(&self, terrain: Entity, piece: &Piece) -> Result<ChunkSamples, TerrainBitsError> {
+    pub fn samples(&self, terrain: Entity, island: &Island) -> Result<ChunkSamples, TerrainBitsError> {
         let no_terrain = TerrainBitsError::NoTerrain { entity: terrain };
         let (volume, _) = self.terrains.get(terrain).map_err(|_| no_terrain)?;
         let settings = volume.settings().ok_or(no_terrain)?;
-        Ok(piece.samples(volume.grid(), settings))
+        Ok(island.samples(volume.grid(), settings))
     }
 
     /// A box as it is now, to be asked [in a task](BitsSnapshot::in_task). Takes a fraction of a microsecond a chunk.
@@ -199,19 +207,19 @@ impl TerrainBits<'_, '_> {
     /// # Errors
     /// As [`TerrainBits::is_solid`].
     pub fn snapshot(&self, terrain: Entity, region: Region) -> Result<BitsSnapshot, TerrainBitsError> {
-        let ground = self.ground(terrain)?;
-        let parts = parts(ground, region).collect::<Result<_, _>>()?;
-        Ok(BitsSnapshot { region, inside: within(ground.grid, region), parts })
+        let query = self.query(terrain)?;
+        let parts = parts(query, region).collect::<Result<_, _>>()?;
+        Ok(BitsSnapshot { region, inside: within(query.grid, region), parts })
     }
 
     fn any_part(
         &self,
         terrain: Entity,
         region: Region,
-        question: impl Fn(&Part) -> Result<bool, TerrainBitsError>,
+        question: impl Fn(&ChunkPart) -> Result<bool, TerrainBitsError>,
     ) -> Result<bool, TerrainBitsError> {
-        let ground = self.ground(terrain)?;
-        for part in parts(ground, region) {
+        let query = self.query(terrain)?;
+        for part in parts(query, region) {
             if question(&part?)? {
                 return Ok(true);
             }
@@ -220,11 +228,11 @@ impl TerrainBits<'_, '_> {
     }
 
     /// The terrain's samples, and the isovalue in effect.
-    fn ground(&self, terrain: Entity) -> Result<Ground<'_>, TerrainBitsError> {
+    fn query(&self, terrain: Entity) -> Result<SolidQuery<'_>, TerrainBitsError> {
         let no_terrain = TerrainBitsError::NoTerrain { entity: terrain };
         let (volume, cache) = self.terrains.get(terrain).map_err(|_| no_terrain)?;
         let settings = volume.settings().ok_or(no_terrain)?;
-        Ok(Ground { grid: volume.grid(), cache, isovalue: settings.isovalue })
+        Ok(SolidQuery { grid: volume.grid(), cache, isovalue: settings.isovalue })
     }
 }
 

@@ -11,14 +11,14 @@ use bevy_math::{DVec3, IVec3, Vec3};
 use bevy_reflect::prelude::*;
 use marchless::BrushError;
 
-use crate::schedule::{MarchlessSystems, NewEdits, Phase};
+use crate::schedule::{MarchlessSystems, NewEdits, UpdatePhase};
 use crate::stats::count_update;
 
 /// One application of a brush to a terrain, asked for by a message.
 ///
 /// It is rounded to 1/256 voxel as it is read and applied in integers from then on: the same stamps in the same order
 /// give the same samples, bit for bit, on any machine. What it changes shows in the same update where it is
-/// small ([`MarchlessSettings::inline_chunks`](crate::schedule::MarchlessSettings::inline_chunks)), updates later where it is not, and never in part.
+/// small ([`MarchlessSettings::max_inline_chunks`](crate::schedule::MarchlessSettings::max_inline_chunks)), updates later where it is not, and never in part.
 ///
 /// A stamp with numbers out of range, or for an entity without a terrain, is dropped with a warning.
 ///
@@ -72,13 +72,13 @@ impl Stamp {
     ///
     /// # Errors
     /// [`BrushError`] about the first number out of range.
-    pub fn quantised(&self) -> Result<marchless::Stamp, BrushError> {
+    pub fn quantised(&self) -> Result<marchless::QuantisedStamp, BrushError> {
         let operation = match self.operation {
             BrushOperation::Add => marchless::Operation::Add,
             BrushOperation::Dig => marchless::Operation::Dig,
             BrushOperation::Paint => marchless::Operation::Paint,
         };
-        let stamp = marchless::Stamp::new(self.shape.quantised()?, operation, self.material);
+        let stamp = marchless::QuantisedStamp::new(self.shape.quantised()?, operation, self.material);
         match &self.stroke {
             Some(stroke) => Ok(stamp.with_stroke(stroke.quantised()?)),
             None => Ok(stamp),
@@ -134,13 +134,15 @@ impl BrushShape {
         Self::Capsule { a: a.into(), b: b.into(), radius }
     }
 
-    fn quantised(&self) -> Result<marchless::BrushShape, BrushError> {
+    fn quantised(&self) -> Result<marchless::QuantisedShape, BrushError> {
         match *self {
-            Self::Sphere { center, radius } => marchless::BrushShape::sphere(center.to_array(), radius.into()),
+            Self::Sphere { center, radius } => marchless::QuantisedShape::sphere(center.to_array(), radius.into()),
             Self::Box { center, half_size } => {
-                marchless::BrushShape::cuboid(center.to_array(), half_size.as_dvec3().to_array())
+                marchless::QuantisedShape::cuboid(center.to_array(), half_size.as_dvec3().to_array())
             }
-            Self::Capsule { a, b, radius } => marchless::BrushShape::capsule(a.to_array(), b.to_array(), radius.into()),
+            Self::Capsule { a, b, radius } => {
+                marchless::QuantisedShape::capsule(a.to_array(), b.to_array(), radius.into())
+            }
         }
     }
 }
@@ -177,8 +179,8 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    fn quantised(&self) -> Result<marchless::Stroke, BrushError> {
-        marchless::Stroke::new(self.id, self.rate.into(), self.falloff.into(), self.start, self.end)
+    fn quantised(&self) -> Result<marchless::QuantisedStroke, BrushError> {
+        marchless::QuantisedStroke::new(self.id, self.rate.into(), self.falloff.into(), self.start, self.end)
     }
 }
 
@@ -214,6 +216,6 @@ impl Plugin for BrushPlugin {
             .init_resource::<NewEdits>()
             .init_resource::<apply::StampQueue>()
             .add_systems(PostUpdate, apply::read_stamps.after(count_update).in_set(MarchlessSystems::ReadStamps))
-            .add_systems(PostUpdate, apply::apply_stamps.in_set(Phase::Edit));
+            .add_systems(PostUpdate, apply::apply_stamps.in_set(UpdatePhase::Edit));
     }
 }

@@ -1,8 +1,8 @@
 //! [`Cover`]: from viewers to the chunks that are wanted, and what differs from before. Pure: it knows no entity but as a
 //! viewer's id, and holds no chunk.
 
+mod load_region;
 mod queue;
-mod range;
 mod rows;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,8 +11,8 @@ use bevy_ecs::entity::Entity;
 use bevy_math::IVec3;
 use bevy_reflect::prelude::*;
 
+pub(crate) use load_region::{LoadRegion, View};
 pub(crate) use queue::{ChunkQueue, UniqueQueue};
-pub(crate) use range::{Range, View};
 use rows::Borders;
 
 /// What a terrain shows at one place: one piece of its cover.
@@ -53,7 +53,7 @@ pub struct Coverage {
 
 /// What viewers ask of a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Wanted {
+pub(crate) enum Residency {
     /// Nothing.
     Gone,
     /// Its samples, for the meshes of its neighbours.
@@ -68,7 +68,7 @@ pub(crate) type ViewId = Option<Entity>;
 /// What all viewers of one terrain see.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cover {
-    views: BTreeMap<ViewId, Watched>,
+    views: BTreeMap<ViewId, TrackedView>,
     /// Those that are revealed in part.
     partial: BTreeSet<ViewId>,
     /// Whether some view has ever asked that samples are dropped: they have to come back some time.
@@ -77,7 +77,7 @@ pub(crate) struct Cover {
 
 /// A view, and how much of it has been told.
 #[derive(Clone, Debug)]
-struct Watched {
+struct TrackedView {
     view: View,
     borders: Borders,
     /// So large a part of its radii has been told, from the middle on: 0 at first, 1 for all.
@@ -86,7 +86,7 @@ struct Watched {
     hidden: usize,
 }
 
-impl Watched {
+impl TrackedView {
     /// The borders of what has been told.
     fn told(&self) -> Borders {
         if self.revealed > 0.0 { Borders::of(&self.view.within(self.revealed)) } else { Borders::default() }
@@ -113,8 +113,8 @@ impl Cover {
         &mut self,
         id: ViewId,
         view: Option<View>,
-        come: impl FnMut([i32; 3], Wanted),
-        go: impl FnMut([i32; 3], Wanted),
+        come: impl FnMut([i32; 3], Residency),
+        go: impl FnMut([i32; 3], Residency),
     ) {
         let old = self.views.remove(&id);
         let Some(view) = view else {
@@ -127,7 +127,7 @@ impl Cover {
         self.drops |= view.samples.is_some();
         let old = match old {
             Some(old) if view.has_borders_of(&old.view) => {
-                self.views.insert(id, Watched { view, ..old });
+                self.views.insert(id, TrackedView { view, ..old });
                 return;
             }
             old => old,
@@ -151,7 +151,7 @@ impl Cover {
         if let Some(old) = &old {
             borders.go(&old.borders, go);
         }
-        self.views.insert(id, Watched { view, borders, revealed, hidden });
+        self.views.insert(id, TrackedView { view, borders, revealed, hidden });
     }
 
     /// Whether all has been told of what viewers ask for.
@@ -165,7 +165,7 @@ impl Cover {
     }
 
     /// Tells one ring more of a view that is revealed in part.
-    pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Wanted)) {
+    pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Residency)) {
         let Some(watched) = self.views.get_mut(&id) else { return };
         let before = watched.told();
         watched.revealed = watched.view.next_ring(watched.revealed);
@@ -189,7 +189,7 @@ impl Cover {
     pub(crate) fn hidden_in_range(&self, mut take: impl FnMut([i32; 3])) {
         for watched in self.partial.iter().filter_map(|id| self.views.get(id)) {
             watched.borders.come(&watched.told(), |position, wanted| {
-                if wanted == Wanted::Mesh {
+                if wanted == Residency::Mesh {
                     take(position);
                 }
             });
@@ -202,19 +202,19 @@ impl Cover {
     }
 
     /// What is asked of a chunk of which there is `now` so much. What a viewer's margin keeps is what is there.
-    pub(crate) fn wanted(&self, position: [i32; 3], now: Wanted) -> Wanted {
+    pub(crate) fn wanted(&self, position: [i32; 3], now: Residency) -> Residency {
         let asked = self.near(position).map(|view| {
             let grown = |by: f64| view.range.grown(by).contains(position);
             let stays = |by: f64| view.with_margin().grown(by).contains(position);
-            if grown(0.0) || now == Wanted::Mesh && stays(0.0) {
-                Wanted::Mesh
-            } else if grown(1.0) || now >= Wanted::Samples && stays(1.0) {
-                Wanted::Samples
+            if grown(0.0) || now == Residency::Mesh && stays(0.0) {
+                Residency::Mesh
+            } else if grown(1.0) || now >= Residency::Samples && stays(1.0) {
+                Residency::Samples
             } else {
-                Wanted::Gone
+                Residency::Gone
             }
         });
-        asked.max().unwrap_or(Wanted::Gone)
+        asked.max().unwrap_or(Residency::Gone)
     }
 
     /// Whether samples are to be there, where they have been dropped.
@@ -282,11 +282,11 @@ mod tests {
             let Self { middle, radii, is_box, margin, samples } = *self;
             let end = |sign: f64| [0, 1, 2].map(|axis| (middle[axis] + sign * radii[axis]).round() as i32);
             let range = if is_box {
-                Range::of_box(Region::new(end(-1.0), end(1.0)), EXTENT)
+                LoadRegion::of_box(Region::new(end(-1.0), end(1.0)), EXTENT)
             } else {
-                Range::ellipsoid(middle, radii, EXTENT)
+                LoadRegion::ellipsoid(middle, radii, EXTENT)
             };
-            let samples = samples.map(|radius| Range::ellipsoid(range.middle(), [radius + 0.1; 3], EXTENT));
+            let samples = samples.map(|radius| LoadRegion::ellipsoid(range.middle(), [radius + 0.1; 3], EXTENT));
             View::new(range, margin, samples, [0.0; 3])
         }
     }
@@ -313,7 +313,7 @@ mod tests {
     /// Chunks that follow what they are told, as a terrain's do.
     #[derive(Default)]
     struct Followers {
-        there: BTreeMap<[i32; 3], Wanted>,
+        there: BTreeMap<[i32; 3], Residency>,
         /// Those that are to be looked at.
         told: BTreeSet<[i32; 3]>,
         /// Those whose samples have been asked for since they may have been dropped.
@@ -321,18 +321,18 @@ mod tests {
     }
 
     impl Followers {
-        fn of(&self, position: [i32; 3]) -> Wanted {
-            self.there.get(&position).copied().unwrap_or(Wanted::Gone)
+        fn of(&self, position: [i32; 3]) -> Residency {
+            self.there.get(&position).copied().unwrap_or(Residency::Gone)
         }
 
-        fn come(&mut self, position: [i32; 3], wanted: Wanted, drops: bool) {
+        fn come(&mut self, position: [i32; 3], wanted: Residency, drops: bool) {
             if drops || self.of(position) < wanted {
                 self.told.insert(position);
             }
         }
 
-        fn go(&mut self, position: [i32; 3], most: Wanted, drops: bool) {
-            if self.of(position) > if drops { Wanted::Gone } else { most } {
+        fn go(&mut self, position: [i32; 3], most: Residency, drops: bool) {
+            if self.of(position) > if drops { Residency::Gone } else { most } {
                 self.told.insert(position);
             }
         }
@@ -398,7 +398,7 @@ mod tests {
                 if cover.drops_samples() {
                     let is_there = followers.sampled.contains(&position);
                     prop_assert!(is_there || !cover.wants_samples(position), "samples of {:?} are wanted", position);
-                    let is_there = is_there && now > Wanted::Gone;
+                    let is_there = is_there && now > Residency::Gone;
                     prop_assert!(!is_there || !cover.may_drop_samples(position), "samples of {:?} stay", position);
                 }
             }

@@ -50,7 +50,7 @@
 //! renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
 //!
 //! Off by default: `big_space` puts chunks into the cells of a `big_space` grid, for worlds of any size. `serde` lets
-//! settings be written and read. `world_files`, which includes it, has terrains follow files in `assets`, also while the
+//! settings be written and read. `terrain_files`, which includes it, has terrains follow files in `assets`, also while the
 //! game runs (module `world`).
 
 #[cfg(feature = "big_space")]
@@ -60,7 +60,11 @@ pub mod brush;
 mod budget;
 pub mod chunk;
 mod cover;
-pub mod debug;
+pub mod diagnostics;
+#[cfg(feature = "terrain_files")]
+pub mod file;
+#[cfg(feature = "gizmos")]
+pub mod gizmos;
 /// How terrain gets on with the rest of Bevy: states, parents, visibility, picking, time, pausing and more.
 ///
 #[cfg_attr(feature = "pbr", doc = include_str!("../docs/in_your_game.md"))]
@@ -70,7 +74,7 @@ mod jobs;
 #[cfg(feature = "pbr")]
 pub mod material;
 pub mod mesh;
-mod place;
+mod placement;
 pub mod query;
 pub mod schedule;
 pub mod source;
@@ -78,38 +82,26 @@ pub mod stats;
 pub mod stream;
 pub mod terrain;
 mod volume;
-#[cfg(feature = "world_files")]
-pub mod world;
 
 use bevy_app::plugin_group;
 
 pub use marchless;
 
-/// What a game that uses terrain usually needs.
+/// What a game that uses terrain usually needs. Sources are in [`source::prelude`], what [`TerrainBits`](bits::TerrainBits)
+/// answers with in [`bits::prelude`].
 pub mod prelude {
     pub use crate::MarchlessPlugins;
-    pub use crate::bits::{BitsSnapshot, Medium, Piece, TerrainBits, TerrainBitsError};
     pub use crate::brush::{BrushOperation, BrushShape, Stamp, Stroke, TerrainEdited};
     pub use crate::chunk::{Chunk, ChunkGeometry};
-    pub use crate::debug::DebugPlugin;
+    #[cfg(feature = "terrain_files")]
+    pub use crate::file::TerrainFile;
     #[cfg(feature = "gizmos")]
-    pub use crate::debug::ShowChunkBounds;
+    pub use crate::gizmos::ShowChunkBounds;
     pub use crate::inherit::ChunkComponentPlugin;
-    #[cfg(feature = "pbr")]
-    pub use crate::material::TerrainMaterialPlugin;
-    pub use crate::mesh::ChunkSamples;
     pub use crate::query::{TerrainHit, TerrainQuery};
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
-    pub use crate::source::*;
-    pub use crate::stats::TerrainStats;
-    pub use crate::stream::{Coverage, Leaf, LeafState, TerrainViewer};
-    pub use crate::terrain::{
-        Extent, Keep, Palette, SourceHandle, Terrain, TerrainError, TerrainSources, TerrainVolume,
-    };
-    #[cfg(feature = "world_files")]
-    pub use crate::world::{TerrainWorld, WorldDescription, WorldSource};
-    pub use marchless::Region;
-    pub use marchless::bits::BitGrid;
+    pub use crate::stream::TerrainViewer;
+    pub use crate::terrain::{Extent, Keep, Palette, Terrain, TerrainVolume};
 }
 
 plugin_group! {
@@ -125,11 +117,13 @@ plugin_group! {
         mesh:::MeshingPlugin,
         inherit:::InheritPlugin,
         #[cfg(feature = "pbr")]
-        material:::MaterialPlugin,
+        material:::StandardTerrainMaterialPlugin,
         #[cfg(feature = "big_space")]
         big_space:::BigSpacePlugin,
-        #[cfg(feature = "world_files")]
-        world:::WorldPlugin,
-        debug:::DebugPlugin,
+        #[cfg(feature = "terrain_files")]
+        file:::TerrainFilePlugin,
+        diagnostics:::TerrainDiagnosticsPlugin,
+        #[cfg(feature = "gizmos")]
+        gizmos:::ChunkGizmosPlugin,
     }
 }

@@ -11,13 +11,13 @@ use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};
 
 use crate::inherit::ChunkComponentPlugin;
 use crate::mesh::ChunkSamples;
-use crate::schedule::Phase;
+use crate::schedule::UpdatePhase;
 use crate::terrain::Terrain;
 
 /// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes, as [`ChunkComponentPlugin`] does, and has
 /// no plain material given to what has one of this type.
 ///
-/// [`MaterialPlugin`] adds it for [`StandardMaterial`]; add it for each other type of material that terrains have.
+/// [`StandardTerrainMaterialPlugin`] adds it for [`StandardMaterial`]; add it for each other type of material that terrains have.
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<M>);
 
 impl<M: Material> Default for TerrainMaterialPlugin<M> {
@@ -38,13 +38,13 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
 /// Draws terrains and hand-made [`ChunkSamples`] with [`StandardMaterial`]: their own, or a plain one where they have none.
 /// That they have another is known where there is a [`TerrainMaterialPlugin`] for its type.
 #[derive(Default)]
-pub struct MaterialPlugin;
+pub struct StandardTerrainMaterialPlugin;
 
-impl Plugin for MaterialPlugin {
+impl Plugin for StandardTerrainMaterialPlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins(TerrainMaterialPlugin::<StandardMaterial>::default())
             .add_observer(take_away_plain_material)
-            .add_systems(PostUpdate, give_default_material.in_set(Phase::Prepare));
+            .add_systems(PostUpdate, give_default_material.in_set(UpdatePhase::Prepare));
     }
 }
 

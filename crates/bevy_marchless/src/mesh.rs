@@ -7,9 +7,9 @@
 //!
 //! A chunk that has never been drawn is a group of its own, which gives way to edits.
 
-mod handmade;
 mod job;
-mod rooms;
+mod pool;
+mod standalone;
 
 use core::cell::Cell;
 use core::time::Duration;
@@ -24,17 +24,19 @@ use bevy_platform::time::Instant;
 use bevy_tasks::AsyncComputeTaskPool;
 use marchless::MeshBuffer;
 
-pub use handmade::{ChunkSamples, ChunkSamplesError};
 use job::{AssetStyle, mesh_chunk, mesh_now, recolor};
-use rooms::MeshRooms;
+use pool::MeshPool;
+pub use standalone::{ChunkSamples, ChunkSamplesError};
 
 use crate::budget::{ENTITY_TIME, FrameBudget, Share};
 use crate::chunk::{ChunkGeometry, mesh_bounds, new_chunk};
 use crate::jobs::{Priority, WorkQueue};
-use crate::schedule::{MakesMeshes, MarchlessSettings, Phase};
+use crate::schedule::{MakesMeshes, MarchlessSettings, UpdatePhase};
 use crate::stats::TerrainStats;
 use crate::terrain::TerrainVolume;
-use crate::volume::{Colors, Drawn, Heart, MeshResult, Meshed, Place, Prepared, Restyle, Restyled, Shown, Swap};
+use crate::volume::{
+    ChunkMesh, Colors, DrawnMesh, Heart, MeshResult, PreparedGroup, Restyle, Restyled, ShowTarget, Shown, Swap,
+};
 
 /// The number of a vertex's material, a `u32`, for shaders.
 pub const ATTRIBUTE_MATERIAL: MeshVertexAttribute =
@@ -47,11 +49,11 @@ pub struct MeshingPlugin;
 impl Plugin for MeshingPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<MakesMeshes>()
-            .init_resource::<MeshRooms>()
+            .init_resource::<MeshPool>()
             .register_type::<ChunkSamples>()
             .register_type::<NoAutoAabb>()
-            .add_observer(handmade::forget_removed_samples)
-            .add_systems(PostUpdate, (mesh_terrains, handmade::mesh_samples).chain().in_set(Phase::Mesh));
+            .add_observer(standalone::forget_removed_samples)
+            .add_systems(PostUpdate, (mesh_terrains, standalone::mesh_samples).chain().in_set(UpdatePhase::Mesh));
     }
 }
 
@@ -60,15 +62,15 @@ const MOST_INLINE: usize = 1024;
 
 /// What showing a mesh takes.
 #[derive(SystemParam)]
-struct Screen<'w, 's> {
+struct MeshPresenter<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
-    rooms: Res<'w, MeshRooms>,
+    pool: Res<'w, MeshPool>,
     settings: Res<'w, MarchlessSettings>,
     stats: ResMut<'w, TerrainStats>,
 }
 
-impl Screen<'_, '_> {
+impl MeshPresenter<'_, '_> {
     /// What the assets of meshes in these colours are like; `None` where there are no assets.
     fn style(&self, colors: &Colors) -> Option<AssetStyle> {
         let usages = self.settings.mesh_usages;
@@ -76,7 +78,7 @@ impl Screen<'_, '_> {
     }
 
     /// Gives an entity its new mesh, which may be empty. `cells`: the chunk's size, whose box bounds an empty mesh.
-    fn show(&mut self, entity: Entity, meshed: Meshed, cells: [u32; 3]) {
+    fn show(&mut self, entity: Entity, meshed: ChunkMesh, cells: [u32; 3]) {
         let bounds = mesh_bounds(&meshed.geometry, cells);
         let mut entity = self.commands.entity(entity);
         let shown = (ChunkGeometry { mesh: meshed.geometry }, bounds);
@@ -94,7 +96,7 @@ impl Screen<'_, '_> {
     }
 
     /// Spawns a chunk with its mesh, which is not empty.
-    fn spawn(&mut self, chunk: impl Bundle, meshed: Meshed, cells: [u32; 3]) -> Entity {
+    fn spawn(&mut self, chunk: impl Bundle, meshed: ChunkMesh, cells: [u32; 3]) -> Entity {
         let bounds = mesh_bounds(&meshed.geometry, cells);
         let mut entity = self.commands.spawn((chunk, ChunkGeometry { mesh: meshed.geometry }, bounds));
         if let (Some(assets), Some(mesh)) = (&mut self.assets, meshed.mesh) {
@@ -109,19 +111,19 @@ fn mesh_terrains(
     mut volumes: Query<(Entity, &mut TerrainVolume)>,
     queue: Res<WorkQueue>,
     mut budget: ResMut<FrameBudget>,
-    mut screen: Screen,
+    mut presenter: MeshPresenter,
 ) {
     let start = Instant::now();
     let threads = AsyncComputeTaskPool::try_get().map_or(1, |pool| pool.thread_num().max(1));
-    let settings = *screen.settings;
-    let mut update = Update {
+    let settings = *presenter.settings;
+    let mut update = MeshUpdate {
         queue: &queue,
-        screen: &mut screen,
+        presenter: &mut presenter,
         until: budget.until(start, Share::Mesh),
         in_flight: settings.in_flight(threads),
-        inline: settings.inline_chunks,
-        inline_left: MOST_INLINE.max(settings.inline_chunks),
-        upload_bytes: settings.upload_bytes,
+        inline: settings.max_inline_chunks,
+        inline_left: MOST_INLINE.max(settings.max_inline_chunks),
+        max_upload_bytes: settings.max_upload_bytes,
         bytes: 0,
         edits: Duration::ZERO,
     };
@@ -147,16 +149,16 @@ pub(crate) fn geometry_bytes(mesh: &MeshBuffer) -> usize {
 }
 
 /// Meshing and showing, in one update.
-struct Update<'a, 'w, 's> {
+struct MeshUpdate<'a, 'w, 's> {
     queue: &'a WorkQueue,
-    screen: &'a mut Screen<'w, 's>,
+    presenter: &'a mut MeshPresenter<'w, 's>,
     until: Instant,
     /// At most this many chunks of a terrain are meshed at once that give way to edits.
     in_flight: usize,
     /// Groups of at most this many chunks are meshed at once, and this many chunks in all.
     inline: usize,
     inline_left: usize,
-    upload_bytes: usize,
+    max_upload_bytes: usize,
     /// So much has been taken from jobs.
     bytes: usize,
     /// What edits have taken, which is not at the cost of others.
@@ -170,7 +172,7 @@ struct Drawing<'a> {
     heart: &'a mut Heart,
 }
 
-impl Update<'_, '_, '_> {
+impl MeshUpdate<'_, '_, '_> {
     /// Everything for one terrain.
     fn mesh(&mut self, drawing: &mut Drawing) {
         self.take_results(drawing);
@@ -190,11 +192,11 @@ impl Update<'_, '_, '_> {
     fn take_results(&mut self, drawing: &mut Drawing) {
         loop {
             let bytes = Cell::new(self.bytes);
-            let Self { until, upload_bytes, .. } = *self;
-            let stats = &mut self.screen.stats;
+            let Self { until, max_upload_bytes, .. } = *self;
+            let stats = &mut self.presenter.stats;
             // New chunks may come one by one; an edit is shown as a whole.
-            let may_take_more = || bytes.get() == 0 || bytes.get() <= upload_bytes && Instant::now() < until;
-            let note = |meshed: &Meshed| {
+            let may_take_more = || bytes.get() == 0 || bytes.get() <= max_upload_bytes && Instant::now() < until;
+            let note = |meshed: &ChunkMesh| {
                 bytes.set(bytes.get() + geometry_bytes(&meshed.geometry).max(1));
                 if !meshed.time.is_zero() {
                     stats.count_mesh(meshed.time);
@@ -225,7 +227,7 @@ impl Update<'_, '_, '_> {
 
     /// Gives chunks another look, one by one.
     fn restyle(&mut self, drawing: &mut Drawing) {
-        let style = self.screen.style(drawing.heart.colors());
+        let style = self.presenter.style(drawing.heart.colors());
         let mut done = 0;
         while (done == 0 || Instant::now() < self.until)
             && let Some(restyle) = drawing.heart.next_restyle(self.in_flight, style.is_some())
@@ -255,11 +257,11 @@ impl Update<'_, '_, '_> {
             && let Some((key, job, settings)) = drawing.heart.next_in_transition(self.in_flight)
         {
             let samples = drawing.heart.samples().neighbourhood(key.position).to_neighbourhood();
-            let style = self.screen.style(drawing.heart.colors());
-            let (results, look) = (drawing.heart.meshed().clone(), drawing.heart.look());
+            let style = self.presenter.style(drawing.heart.colors());
+            let (results, appearance) = (drawing.heart.meshed().clone(), drawing.heart.appearance());
             let ticket = self.queue.push(Priority::Restyle, move || {
                 let meshed = mesh_chunk(&samples.view(), key.position, &settings, style.as_ref(), None);
-                results.push(MeshResult::Restyled(Restyled { job, meshed, look }));
+                results.push(MeshResult::Restyled(Restyled { job, meshed, appearance }));
             });
             drawing.heart.started_in_transition(key, job, ticket);
             done += 1;
@@ -268,12 +270,12 @@ impl Update<'_, '_, '_> {
 
     /// Meshes what is missing for the other isovalue, and shows it.
     fn end_transition(&mut self, drawing: &mut Drawing) {
-        let style = self.screen.style(drawing.heart.colors());
+        let style = self.presenter.style(drawing.heart.colors());
         while let Some((key, _, settings)) = drawing.heart.next_in_transition(usize::MAX) {
             let samples = [(key.position, drawing.heart.samples().neighbourhood(key.position))];
-            let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.screen.rooms);
+            let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.presenter.pool);
             for meshed in meshed {
-                self.screen.stats.count_mesh(meshed.time);
+                self.presenter.stats.count_mesh(meshed.time);
                 drawing.heart.meshed_in_transition(meshed);
             }
         }
@@ -283,23 +285,23 @@ impl Update<'_, '_, '_> {
     }
 
     /// Starts a group: shows it at once, where that is quick, or asks for its meshes.
-    fn start(&mut self, drawing: &mut Drawing, prepared: Prepared) {
+    fn start(&mut self, drawing: &mut Drawing, prepared: PreparedGroup) {
         let count = prepared.to_mesh.len();
         if count > self.inline.min(self.inline_left) {
             return self.start_jobs(drawing, prepared, Priority::Edit);
         }
         self.inline_left -= count;
         let (settings, mut group) = (drawing.heart.mesh_settings(), prepared.group);
-        let style = self.screen.style(drawing.heart.colors());
+        let style = self.presenter.style(drawing.heart.colors());
         let samples: Vec<_> = prepared
             .to_mesh
             .iter()
             .map(|position| (*position, drawing.heart.samples().neighbourhood(*position)))
             .collect();
-        let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.screen.rooms);
-        self.screen.rooms.prepare(meshed.iter().map(|meshed| &*meshed.geometry), style.is_some());
+        let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.presenter.pool);
+        self.presenter.pool.prepare(meshed.iter().map(|meshed| &*meshed.geometry), style.is_some());
         for meshed in meshed {
-            self.screen.stats.count_mesh(meshed.time);
+            self.presenter.stats.count_mesh(meshed.time);
             group.push(meshed);
         }
         let shown = drawing.heart.show(group);
@@ -307,13 +309,13 @@ impl Update<'_, '_, '_> {
     }
 
     /// Asks for the meshes of a group; shows it, if there are none to be made.
-    fn start_jobs(&mut self, drawing: &mut Drawing, prepared: Prepared, priority: Priority) {
+    fn start_jobs(&mut self, drawing: &mut Drawing, prepared: PreparedGroup, priority: Priority) {
         if prepared.to_mesh.is_empty() {
             let shown = drawing.heart.show(prepared.group);
             return self.show(drawing, shown);
         }
         let (results, settings) = (drawing.heart.meshed().clone(), drawing.heart.mesh_settings());
-        let style = self.screen.style(drawing.heart.colors());
+        let style = self.presenter.style(drawing.heart.colors());
         drawing.heart.start(prepared, |heart, id, position| {
             let samples = heart.samples().neighbourhood(position).to_neighbourhood();
             let (results, style) = (results.clone(), style.clone());
@@ -328,24 +330,24 @@ impl Update<'_, '_, '_> {
         let cells = [drawing.heart.samples().shown().chunk_cells(); 3];
         for swap in shown.swaps {
             match swap.place {
-                Place::Nowhere => {}
-                Place::On(entity) => self.screen.show(entity, swap.meshed, cells),
-                Place::Recolored(entity) => {
+                ShowTarget::Nowhere => {}
+                ShowTarget::On(entity) => self.presenter.show(entity, swap.meshed, cells),
+                ShowTarget::Recolored(entity) => {
                     if let Some(mesh) = swap.meshed.mesh {
-                        self.screen.show_asset(entity, mesh);
+                        self.presenter.show_asset(entity, mesh);
                     }
                 }
-                Place::New => {
-                    let Swap { key, look, meshed, .. } = swap;
+                ShowTarget::New => {
+                    let Swap { key, appearance, meshed, .. } = swap;
                     let geometry = meshed.geometry.clone();
                     let chunk = new_chunk(drawing.terrain, key, cells[0], drawing.voxel_size);
-                    let entity = self.screen.spawn(chunk, meshed, cells);
-                    drawing.heart.spawned(key, Drawn { entity, geometry, look });
+                    let entity = self.presenter.spawn(chunk, meshed, cells);
+                    drawing.heart.spawned(key, DrawnMesh { entity, geometry, appearance });
                 }
             }
         }
         for since in shown.since {
-            self.screen.stats.count_edit_shown(since);
+            self.presenter.stats.count_edit_shown(since);
         }
     }
 }

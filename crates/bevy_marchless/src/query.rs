@@ -13,7 +13,7 @@ use bevy_transform::TransformSystems;
 use marchless::Region;
 
 use crate::chunk::ChunkKey;
-use crate::place::{Place, PlaceItem};
+use crate::placement::{Placement, PlacementItem};
 use crate::terrain::{TerrainVolume, give_to_terrains};
 use visibility::IsHidden;
 
@@ -52,7 +52,7 @@ impl Plugin for QueryPlugin {
 /// ```
 #[derive(SystemParam)]
 pub struct TerrainQuery<'w, 's> {
-    terrains: Query<'w, 's, (Entity, &'static TerrainVolume, Place)>,
+    terrains: Query<'w, 's, (Entity, &'static TerrainVolume, Placement)>,
     hidden: Query<'w, 's, &'static IsHidden>,
 }
 
@@ -206,7 +206,7 @@ fn is_unfilled(volume: &TerrainVolume, chunk: [i32; 3]) -> bool {
 }
 
 fn cast(
-    (terrain, volume, place): (Entity, &TerrainVolume, PlaceItem),
+    (terrain, volume, place): (Entity, &TerrainVolume, PlacementItem),
     ray: Ray3d,
     max_distance: f32,
 ) -> Option<TerrainHit> {

@@ -142,12 +142,26 @@ pub enum SourceError {
     },
 }
 
+/// Everything that sources are made of.
+pub mod prelude {
+    #[cfg(any(feature = "noise", feature = "png"))]
+    pub use super::Stratum;
+    pub use super::{Air, Bound, Lipschitz, Sdf, Source, SourceError, SourceRegion};
+    #[cfg(feature = "noise")]
+    pub use super::{
+        Caves, Fractal, Landscape, LandscapeSettings, Layer, MaterialRule, NoiseDensity, NoiseDensitySettings,
+        NoiseHeights, NoiseHeightsSettings, Patches, Solid, Tunnels,
+    };
+    #[cfg(feature = "png")]
+    pub use super::{HeightMap, HeightMapError, HeightMapSettings};
+}
+
 /// Heights, positions and lengths reach at most this far, in world units.
 pub(crate) const FARTHEST: f64 = 1e9;
 
 /// How many voxels away from the surface a region must be before a bound skips it, so that an isovalue other than zero
 /// still finds samples.
-pub(crate) const ROOM: f64 = 4.0;
+pub(crate) const BOUND_MARGIN: f64 = 4.0;
 
 /// `found`, where it is `valid`.
 pub(crate) fn check(

@@ -44,8 +44,8 @@ pub struct TerrainStats {
 
 impl TerrainStats {
     /// This moment.
-    pub(crate) fn now(&self) -> Since {
-        Since { update: self.updates, time: Instant::now() }
+    pub(crate) fn now(&self) -> RequestTime {
+        RequestTime { update: self.updates, time: Instant::now() }
     }
 
     /// Notes that a chunk has been meshed.
@@ -55,7 +55,7 @@ impl TerrainStats {
     }
 
     /// Notes that an edit asked for at `since` is visible.
-    pub(crate) fn count_edit_shown(&mut self, since: Since) {
+    pub(crate) fn count_edit_shown(&mut self, since: RequestTime) {
         self.edits_shown += 1;
         self.edit_updates_last = self.updates - since.update;
         self.edit_time_last = since.time.elapsed();
@@ -64,12 +64,12 @@ impl TerrainStats {
 
 /// When something was asked for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Since {
+pub(crate) struct RequestTime {
     update: u64,
     time: Instant,
 }
 
-impl Since {
+impl RequestTime {
     pub(crate) fn earlier(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         match (a, b) {
             (Some(a), Some(b)) => Some(if b.time < a.time { b } else { a }),

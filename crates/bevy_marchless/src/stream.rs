@@ -31,7 +31,7 @@ use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
 
 pub use crate::cover::{Coverage, Leaf, LeafState};
-use crate::schedule::Phase;
+use crate::schedule::UpdatePhase;
 use crate::terrain::give_to_terrains;
 
 /// Loads terrains around viewers, fills them from their sources, and unloads them.
@@ -41,9 +41,11 @@ pub struct StreamPlugin;
 impl Plugin for StreamPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<TerrainViewer>();
-        give_to_terrains::<follow::Followed>(app);
-        app.add_systems(PostUpdate, follow::follow_viewers.in_set(Phase::Follow))
-            .add_systems(PostUpdate, (fill::take_filled_chunks, fill::ask_for_samples).chain().in_set(Phase::Fill));
+        give_to_terrains::<follow::TerrainViews>(app);
+        app.add_systems(PostUpdate, follow::follow_viewers.in_set(UpdatePhase::Load)).add_systems(
+            PostUpdate,
+            (fill::take_filled_chunks, fill::ask_for_samples).chain().in_set(UpdatePhase::Fill),
+        );
     }
 }
 

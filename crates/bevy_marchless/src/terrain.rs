@@ -21,9 +21,9 @@ pub use volume::TerrainVolume;
 
 use crate::chunk::{Chunk, ChunkGeometry};
 use crate::cover::{Coverage, Leaf, LeafState};
-use crate::schedule::Phase;
+use crate::schedule::UpdatePhase;
 use crate::source::Air;
-use crate::volume::Recipe;
+use crate::volume::SamplingSettings;
 
 /// A terrain, its settings and what it is made of.
 ///
@@ -207,8 +207,8 @@ impl Terrain {
     }
 
     /// What its samples are before anyone edits them.
-    pub(crate) fn recipe(&self) -> Recipe {
-        Recipe {
+    pub(crate) fn recipe(&self) -> SamplingSettings {
+        SamplingSettings {
             source: self.source.get().clone(),
             extent: self.chunk_region(),
             cells: self.chunk_cells,
@@ -371,7 +371,7 @@ impl Plugin for TerrainPlugin {
             .add_observer(prepare::forget_removed_terrain)
             .add_systems(
                 PostUpdate,
-                (prepare::despawn_copied_chunks, prepare::prepare_terrains).in_set(Phase::Prepare),
+                (prepare::despawn_copied_chunks, prepare::prepare_terrains).in_set(UpdatePhase::Prepare),
             );
     }
 }

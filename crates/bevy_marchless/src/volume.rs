@@ -1,7 +1,7 @@
 //! [`Heart`]: what a terrain is made of, what is shown of it, and what is to be done about it. It knows no system, no query
 //! and no command: systems tell it what has happened, and carry out what it asks for.
 //!
-//! Its parts own their state, and each is tested alone: [`Samples`] (what is there), [`ChunkTable`] (how far each
+//! Its parts own their state, and each is tested alone: [`SampleStore`] (what is there), [`ChunkTable`] (how far each
 //! loaded chunk is), [`Groups`] (what is meshed together), [`Cover`] (what is wanted). What takes several of them is here,
 //! an event a function: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples arrive),
 //! [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle) (colours, normals
@@ -11,11 +11,11 @@ mod edit;
 mod fill;
 mod follow;
 mod groups;
+mod known_signs;
 mod memory;
 mod mesh;
 mod restyle;
 mod samples;
-mod signs;
 mod stamps;
 mod table;
 #[cfg(test)]
@@ -26,30 +26,30 @@ use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
 use bevy_platform::collections::{HashMap, HashSet};
-use marchless::{Chunk, Edit, Grid, MeshSettings, Region, Source};
+use marchless::{Edit, Grid, GridChunk, MeshSettings, Region, Source};
 
 pub(crate) use edit::Edits;
 pub(crate) use fill::Filled;
 use groups::Purpose;
-pub(crate) use groups::{Group, Meshed};
-pub(crate) use mesh::{MeshResult, Prepared, Shown, Swap};
+pub(crate) use groups::{ChunkMesh, Group};
+pub(crate) use known_signs::KnownSigns;
+pub(crate) use mesh::{MeshResult, PreparedGroup, Shown, Swap};
 pub(crate) use restyle::{Restyle, Restyled};
-pub(crate) use samples::Samples;
-pub(crate) use signs::Signs;
-pub(crate) use table::{ChunkTable, Drawn, Place};
+pub(crate) use samples::SampleStore;
+pub(crate) use table::{ChunkTable, DrawnMesh, ShowTarget};
 
 use crate::chunk::ChunkKey;
-use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, UniqueQueue, ViewId, Wanted};
+use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, Residency, UniqueQueue, ViewId};
 use crate::jobs::{Results, Ticket};
 use groups::Groups;
-use restyle::{Look, Transition};
+use restyle::{Appearance, Transition};
 
 /// The linear colours of all materials.
 pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
 
 /// What a terrain's samples are before anyone edits them.
 #[derive(Clone)]
-pub(crate) struct Recipe {
+pub(crate) struct SamplingSettings {
     pub(crate) source: Arc<dyn Source>,
     /// The chunks that there are.
     pub(crate) extent: Region,
@@ -62,8 +62,8 @@ pub(crate) struct Recipe {
 /// One terrain's state.
 pub(crate) struct Heart {
     /// `None` before the terrain's settings have been accepted.
-    recipe: Option<Recipe>,
-    samples: Samples,
+    recipe: Option<SamplingSettings>,
+    samples: SampleStore,
     table: ChunkTable,
     groups: Groups,
     cover: Cover,
@@ -85,10 +85,10 @@ pub(crate) struct Heart {
     /// How many jobs are sampling, or about to.
     sampling: usize,
     /// What the source is certain of, box by box.
-    bounds: HashMap<[i32; 3], Option<Chunk<i16>>>,
+    bounds: HashMap<[i32; 3], Option<GridChunk<i16>>>,
     /// The isovalue as drawn.
     isovalue: f32,
-    look: Look,
+    appearance: Appearance,
     /// Chunks that may have to get another look.
     to_restyle: UniqueQueue,
     /// The change of the isovalue that is under way, and the one to come after it.
@@ -111,7 +111,7 @@ impl Default for Heart {
     fn default() -> Self {
         Self {
             recipe: None,
-            samples: Samples::default(),
+            samples: SampleStore::default(),
             table: ChunkTable::new(Region::new([0; 3], [0; 3]), true),
             groups: Groups::default(),
             cover: Cover::default(),
@@ -126,7 +126,7 @@ impl Default for Heart {
             sampling: 0,
             bounds: HashMap::default(),
             isovalue: 0.0,
-            look: Look::default(),
+            appearance: Appearance::default(),
             to_restyle: UniqueQueue::default(),
             transition: None,
             next_isovalue: None,
@@ -143,20 +143,20 @@ impl Default for Heart {
 
 impl Heart {
     /// A terrain of which nothing is loaded yet. `meshing`: whether somebody makes meshes.
-    pub(crate) fn new(recipe: Recipe, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
+    pub(crate) fn new(recipe: SamplingSettings, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
         Self {
-            samples: Samples::of(recipe.empty_grid()),
+            samples: SampleStore::of(recipe.empty_grid()),
             table: ChunkTable::new(recipe.extent, meshing),
             recipe: Some(recipe),
             isovalue,
-            look: Look::new(normals, colors),
+            appearance: Appearance::new(normals, colors),
             ..Self::default()
         }
     }
 
     /// Has all samples come from another source: what was edited is gone, and what is drawn stays until each chunk's new
     /// mesh is there. The chunks are where they were.
-    pub(crate) fn refill(&mut self, recipe: Recipe, isovalue: f32) {
+    pub(crate) fn refill(&mut self, recipe: SamplingSettings, isovalue: f32) {
         self.samples.refill(recipe.empty_grid());
         self.table.refill();
         self.groups.take_all();
@@ -188,7 +188,7 @@ impl Heart {
         counts.outdated == 0 && (self.has_shown || !may_show || self.is_settled())
     }
 
-    pub(crate) const fn samples(&self) -> &Samples {
+    pub(crate) const fn samples(&self) -> &SampleStore {
         &self.samples
     }
 
@@ -218,12 +218,12 @@ impl Heart {
 
     /// How the meshes that are started now are made.
     pub(crate) fn mesh_settings(&self) -> MeshSettings {
-        MeshSettings { isovalue: self.isovalue, normals: self.look.normals, ..MeshSettings::default() }
+        MeshSettings { isovalue: self.isovalue, normals: self.appearance.normals, ..MeshSettings::default() }
     }
 
     /// The colours of the meshes that are started now.
     pub(crate) const fn colors(&self) -> &Colors {
-        &self.look.colors
+        &self.appearance.colors
     }
 
     /// Notes whether a stamp waits for samples.
@@ -306,7 +306,7 @@ impl Heart {
             },
             |position, most| {
                 let key = ChunkKey::finest(position);
-                if table.has_more(key, if keeps_samples { most } else { Wanted::Gone }) {
+                if table.has_more(key, if keeps_samples { most } else { Residency::Gone }) {
                     leaving.push(key);
                 }
             },
@@ -321,7 +321,7 @@ impl Heart {
     }
 }
 
-impl Recipe {
+impl SamplingSettings {
     /// A grid for its chunks; the settings have been checked.
     pub(crate) fn empty_grid(&self) -> Grid<i16> {
         Grid::bounded(self.cells, self.extent).expect("the settings have been checked")

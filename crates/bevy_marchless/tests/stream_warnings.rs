@@ -16,7 +16,7 @@ use common::*;
 /// Sets a world up, updates it 100 times while all is well and 100 times after a change, and returns what was said.
 fn said(terrain: Terrain, change: impl Fn(&mut App, Entity, Entity)) -> Vec<String> {
     let mut app = app_with_budget(16);
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_millis(1);
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_millis(1);
     let terrain = app.world_mut().spawn(terrain.with_chunk_cells(8)).id();
     let viewer = app.world_mut().spawn(TerrainViewer::new(12.0)).id();
     for _ in 0..100 {

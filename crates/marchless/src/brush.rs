@@ -1,18 +1,18 @@
-//! Brushes: a [`Stamp`] is one application of a shape and an operation to samples, in integers throughout.
+//! Brushes: a [`QuantisedStamp`] is one application of a shape and an operation to samples, in integers throughout.
 //!
 //! A stamp is quantised once, when its shape and stroke are made from floating-point numbers; from then on the same
 //! stamps in the same order give the same samples, bit for bit, on any machine. Each sample changes by itself, so
 //! stamps may be applied to a whole [`Grid`](crate::Grid) or chunk by chunk, each chunk in its own time.
 //!
 //! ```
-//! use marchless::{BrushShape, Grid, Operation, Stamp};
+//! use marchless::{Grid, Operation, QuantisedShape, QuantisedStamp};
 //!
 //! let mut grid = Grid::<i16>::new(32)?;
-//! let ball = Stamp::new(BrushShape::sphere([0.0, 0.0, 0.0], 6.0)?, Operation::Add, 3);
+//! let ball = QuantisedStamp::new(QuantisedShape::sphere([0.0, 0.0, 0.0], 6.0)?, Operation::Add, 3);
 //! let edit = grid.apply(&ball);
 //! assert_eq!(edit.added.get(3), edit.added.total());
 //!
-//! let hole = Stamp::new(BrushShape::sphere([6.0, 0.0, 0.0], 3.0)?, Operation::Dig, 0);
+//! let hole = QuantisedStamp::new(QuantisedShape::sphere([6.0, 0.0, 0.0], 3.0)?, Operation::Dig, 0);
 //! assert!(grid.apply(&hole).removed.get(3) > 0);
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
@@ -30,7 +30,7 @@ use thiserror::Error;
 
 use crate::lattice::Region;
 pub use edit::{Edit, VolumeByMaterial};
-pub use shape::BrushShape;
+pub use shape::QuantisedShape;
 use shape::{UNITS, units};
 
 /// As far from the surface as an edit ever leaves a sample that it changes: 4 voxels, in steps of an `i16` weight.
@@ -45,17 +45,17 @@ pub const EDIT_LIMIT: i16 = 4 * UNITS as i16;
 /// is, goes by the stamp's isovalue. Changed weights are clamped to within [`EDIT_LIMIT`] of it; a sample whose clamped
 /// weight stays the same stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Stamp {
+pub struct QuantisedStamp {
     /// Where.
-    pub shape: BrushShape,
+    pub shape: QuantisedShape,
     /// What.
     pub operation: Operation,
     /// The material of the samples that become solid, or that are painted; digging does not use it.
     pub material: u8,
     /// How far weights move, for a stamp that is a part of a timed stroke; painting does not use it.
-    pub stroke: Option<Stroke>,
+    pub stroke: Option<QuantisedStroke>,
     /// The least weight that is not solid, in 1/256 voxel: what the surface's isovalue is, rounded up. Values beyond
-    /// ±[`Stamp::MAX_ISOVALUE`] count as that.
+    /// ±[`QuantisedStamp::MAX_ISOVALUE`] count as that.
     pub isovalue: i16,
 }
 
@@ -76,7 +76,7 @@ pub enum Operation {
 /// to start, a stroke is cut. The sample's rate is `rate` at least `falloff` deep inside the shape and falls linearly
 /// to 0 at the shape's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Stroke {
+pub struct QuantisedStroke {
     /// The user's number for the stroke that this stamp is a part of; it has no effect on the samples.
     pub id: u64,
     /// How fast weights move where the falloff does not reach, in 1/256 voxel per second.
@@ -89,12 +89,12 @@ pub struct Stroke {
     pub end_us: u64,
 }
 
-impl Stamp {
+impl QuantisedStamp {
     /// The highest isovalue, either way, in 1/256 voxel: some 124 voxels, so that weights have room around it.
     pub const MAX_ISOVALUE: i16 = i16::MAX - EDIT_LIMIT;
 
     /// A whole stamp on the surface at isovalue 0.
-    pub const fn new(shape: BrushShape, operation: Operation, material: u8) -> Self {
+    pub const fn new(shape: QuantisedShape, operation: Operation, material: u8) -> Self {
         Self { shape, operation, material, stroke: None, isovalue: 0 }
     }
 
@@ -108,7 +108,7 @@ impl Stamp {
 
     /// The same stamp as a part of a timed stroke.
     #[must_use]
-    pub const fn with_stroke(self, stroke: Stroke) -> Self {
+    pub const fn with_stroke(self, stroke: QuantisedStroke) -> Self {
         Self { stroke: Some(stroke), ..self }
     }
 
@@ -126,11 +126,11 @@ impl Stamp {
     }
 }
 
-impl Stroke {
-    /// The highest rate that [`Stroke::new`] takes, in voxels per second.
+impl QuantisedStroke {
+    /// The highest rate that [`QuantisedStroke::new`] takes, in voxels per second.
     pub const MAX_RATE: f64 = 65_536.0;
-    /// The widest falloff that [`Stroke::new`] takes, in voxels.
-    pub const MAX_FALLOFF: f64 = BrushShape::MAX_RADIUS;
+    /// The widest falloff that [`QuantisedStroke::new`] takes, in voxels.
+    pub const MAX_FALLOFF: f64 = QuantisedShape::MAX_RADIUS;
 
     /// A part of stroke `id`: `rate` in voxels per second, `falloff` in voxels, times since the stroke began.
     /// Rate and falloff are rounded to 1/256, times cut to whole microseconds.
@@ -165,14 +165,14 @@ pub enum BrushError {
     /// A coordinate is NaN, infinite or too far out.
     #[error(
         "a brush's coordinates must lie within ±{} voxels of the origin, but one is {found}",
-        BrushShape::MAX_POSITION
+        QuantisedShape::MAX_POSITION
     )]
     Position {
         /// What was given, in voxels.
         found: f64,
     },
     /// A radius or half size is NaN, not above 0, or too large.
-    #[error("a brush's {name} must be above 0 and at most {} voxels, but it is {found}", BrushShape::MAX_RADIUS)]
+    #[error("a brush's {name} must be above 0 and at most {} voxels, but it is {found}", QuantisedShape::MAX_RADIUS)]
     Size {
         /// Which size it is.
         name: &'static str,
@@ -182,20 +182,20 @@ pub enum BrushError {
     /// A capsule's ends are too far apart.
     #[error(
         "a capsule's ends must be at most {} voxels apart along each axis, but they are {found} apart",
-        BrushShape::MAX_LENGTH
+        QuantisedShape::MAX_LENGTH
     )]
     Length {
         /// The distance along the axis where it is too large, in voxels.
         found: f64,
     },
     /// A stroke's rate is NaN, negative or too high.
-    #[error("a stroke's rate must be from 0 to {} voxels per second, but it is {found}", Stroke::MAX_RATE)]
+    #[error("a stroke's rate must be from 0 to {} voxels per second, but it is {found}", QuantisedStroke::MAX_RATE)]
     Rate {
         /// What was given, in voxels per second.
         found: f64,
     },
     /// A stroke's falloff is NaN, negative or too wide.
-    #[error("a stroke's falloff must be from 0 to {} voxels, but it is {found}", Stroke::MAX_FALLOFF)]
+    #[error("a stroke's falloff must be from 0 to {} voxels, but it is {found}", QuantisedStroke::MAX_FALLOFF)]
     Falloff {
         /// What was given, in voxels.
         found: f64,

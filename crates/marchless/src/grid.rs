@@ -5,9 +5,9 @@ pub(crate) mod border;
 mod chunk;
 mod chunks;
 mod error;
+mod mesh_changes;
 pub(crate) mod occupancy;
-mod redrawn;
-mod spare;
+mod pool;
 #[cfg(test)]
 mod tests;
 
@@ -15,11 +15,11 @@ use alloc::collections::BTreeSet;
 
 pub use self::block::{Block, Neighbourhood, NeighbourhoodView};
 use self::border::Border;
-pub use self::chunk::{BOUND_BOX_CHUNKS, Chunk, ChunkSamples};
+pub use self::chunk::{BOUND_BOX_CHUNKS, GridChunk, GridSamples};
 use self::chunks::Chunks;
 pub use self::error::GridError;
 use self::occupancy::Occupancy;
-pub use self::spare::SpareSamples;
+pub use self::pool::SamplePool;
 use crate::buffer::MeshBuffer;
 use crate::lattice::Region;
 use crate::mesher::{MeshError, MeshSettings, Mesher};
@@ -158,7 +158,7 @@ impl<W: Weight> Grid<W> {
         self.check(position)?;
         if self.get(point) != voxel {
             let (cells, index) = (self.cells, self.index(point));
-            let samples = self.chunk_mut(position)?.samples_mut(cells, &mut SpareSamples::new());
+            let samples = self.chunk_mut(position)?.samples_mut(cells, &mut SamplePool::new());
             samples.weights[index] = voxel.weight;
             samples.materials[index] = voxel.material;
             self.mark_dirty(Region::new(point, point).grown(0, 1));
@@ -171,9 +171,9 @@ impl<W: Weight> Grid<W> {
     /// # Errors
     /// [`GridError::OutOfBounds`], and [`GridError::SamplesLength`] where the chunk is of another size; nothing is
     /// changed then.
-    pub fn insert(&mut self, position: [i32; 3], chunk: Chunk<W>) -> Result<(), GridError> {
+    pub fn insert(&mut self, position: [i32; 3], chunk: GridChunk<W>) -> Result<(), GridError> {
         self.check(position)?;
-        self.load(position, chunk)?;
+        self.insert_clean(position, chunk)?;
         self.mark_dirty(self.chunk_region(position));
         Ok(())
     }
@@ -183,7 +183,7 @@ impl<W: Weight> Grid<W> {
     ///
     /// # Errors
     /// [`GridError::SamplesLength`], and [`GridError::OutOfBounds`] where there is no place for a chunk in any grid.
-    pub fn load(&mut self, position: [i32; 3], chunk: Chunk<W>) -> Result<(), GridError> {
+    pub fn insert_clean(&mut self, position: [i32; 3], chunk: GridChunk<W>) -> Result<(), GridError> {
         chunk.check(self.cells)?;
         let bounds = Self::largest(self.cells);
         if !bounds.contains(position) {
@@ -194,11 +194,11 @@ impl<W: Weight> Grid<W> {
     }
 
     /// Takes the chunk at `position` out and marks nothing dirty.
-    pub fn unload(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
+    pub fn remove_clean(&mut self, position: [i32; 3]) -> Option<GridChunk<W>> {
         self.chunks.remove(position)
     }
 
-    /// Puts the base samples of `source` ([`Chunk::from_source`]) at `position`. `spacing`: world units per voxel.
+    /// Puts the base samples of `source` ([`GridChunk::from_source`]) at `position`. `spacing`: world units per voxel.
     ///
     /// ```
     /// use marchless::{Grid, Region};
@@ -216,21 +216,21 @@ impl<W: Weight> Grid<W> {
     /// [`GridError::OutOfBounds`]; nothing is sampled then.
     pub fn fill(&mut self, position: [i32; 3], source: &(impl Source + ?Sized), spacing: f64) -> Result<(), GridError> {
         self.check(position)?;
-        self.insert(position, Chunk::from_source(source, position, self.cells, spacing))
+        self.insert(position, GridChunk::from_source(source, position, self.cells, spacing))
     }
 
     /// The chunk at `position`, where there is one; also beyond the bounds.
-    pub fn chunk(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
+    pub fn chunk(&self, position: [i32; 3]) -> Option<&GridChunk<W>> {
         self.chunks.get(position)
     }
 
     /// All chunks, in order of position.
-    pub fn chunks(&self) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+    pub fn chunks(&self) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.chunks.iter()
     }
 
     /// The chunks from `position` on, in the order of [`chunks`](Self::chunks): for going through them a part at a time.
-    pub fn chunks_from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+    pub fn chunks_from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.chunks.from(position)
     }
 
@@ -238,22 +238,22 @@ impl<W: Weight> Grid<W> {
     /// [`chunks`](Self::chunks). The cost is in proportion to what is there, whatever the size of the region or the grid.
     ///
     /// ```
-    /// use marchless::{Chunk, Grid, Region};
+    /// use marchless::{Grid, GridChunk, Region};
     ///
     /// let mut grid = Grid::<i16>::new(32)?;
     /// for position in [[0, 0, 0], [-70_000, 3, 9], [5, 0, 0]] {
-    ///     grid.insert(position, Chunk::AIR)?;
+    ///     grid.insert(position, GridChunk::AIR)?;
     /// }
     /// let west = Region::new([i32::MIN; 3], [5, i32::MAX, i32::MAX]);
     /// assert_eq!(grid.chunks_in(west).count(), 2);
     /// # Ok::<(), marchless::GridError>(())
     /// ```
-    pub fn chunks_in(&self, region: Region) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+    pub fn chunks_in(&self, region: Region) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.chunks.positions_in(region).filter_map(|position| Some((position, self.chunk(position)?)))
     }
 
     /// Takes the chunk at `position` out, so that it reads as air, and marks it and its neighbours dirty.
-    pub fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
+    pub fn remove(&mut self, position: [i32; 3]) -> Option<GridChunk<W>> {
         let chunk = self.chunks.remove(position)?;
         self.mark_dirty(self.chunk_region(position));
         Some(chunk)
@@ -350,19 +350,19 @@ impl<W: Weight> Grid<W> {
     }
 
     /// The chunk at `position`, where there is one within the bounds.
-    pub(crate) fn seen_chunk(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
+    pub(crate) fn seen_chunk(&self, position: [i32; 3]) -> Option<&GridChunk<W>> {
         let is_seen = self.bounds.is_none_or(|bounds| bounds.contains(position));
         self.chunks.get(position).filter(|_| is_seen)
     }
 
     /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who marks what has changed.
-    pub(crate) fn chunk_mut(&mut self, position: [i32; 3]) -> Result<&mut Chunk<W>, GridError> {
+    pub(crate) fn chunk_mut(&mut self, position: [i32; 3]) -> Result<&mut GridChunk<W>, GridError> {
         self.check(position)?;
         Ok(self.chunks.get_mut_or_air(position))
     }
 
     /// The chunk at `position`, where there is one, also beyond the bounds, to be changed in the same way.
-    pub(crate) fn present_chunk_mut(&mut self, position: [i32; 3]) -> Option<&mut Chunk<W>> {
+    pub(crate) fn present_chunk_mut(&mut self, position: [i32; 3]) -> Option<&mut GridChunk<W>> {
         self.chunks.get_mut(position)
     }
 

@@ -21,11 +21,11 @@
 //! three the same mesh. [`Grid`] keeps a whole volume in chunks that mesh one by one without seams:
 //!
 //! ```
-//! use marchless::{BrushShape, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Operation, Region, Stamp};
+//! use marchless::{Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Operation, QuantisedShape, QuantisedStamp, Region};
 //!
 //! // Two chunks of 32 cells with air around them, and a ball across their common border.
 //! let mut grid = Grid::<i16>::bounded(32, Region::new([0; 3], [2, 1, 1]))?;
-//! grid.apply(&Stamp::new(BrushShape::sphere([32.0, 16.0, 16.0], 9.5)?, Operation::Add, 1));
+//! grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([32.0, 16.0, 16.0], 9.5)?, Operation::Add, 1));
 //!
 //! let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
 //! for chunk in grid.take_dirty() {
@@ -81,6 +81,9 @@
 //! The crate's tests mesh every pattern of signs of one, two and 2 × 2 × 1 cells and ten million of 2 × 2 × 2, and
 //! compare both topologies with references that share nothing with the mesher.
 //!
+//! # Not promised
+//! Items that this documentation hides serve `bevy_marchless` and tests, and may change at any time.
+//!
 //! # Features
 //! `std` (default) finds out at run time which instructions the processor has ([`Backend`]), instead of using those
 //! that the crate was compiled for; it adds `ThreadedMesher`, and uses the standard library's square root instead of
@@ -107,12 +110,14 @@ mod simd;
 mod source;
 mod validate;
 
-pub use brush::{BrushError, BrushShape, EDIT_LIMIT, Edit, Operation, Stamp, Stroke, VolumeByMaterial};
+pub use brush::{
+    BrushError, EDIT_LIMIT, Edit, Operation, QuantisedShape, QuantisedStamp, QuantisedStroke, VolumeByMaterial,
+};
 pub use buffer::MeshBuffer;
 pub use cell::{CaseIndex, Corner, Edge, Face};
 pub use grid::{
-    BOUND_BOX_CHUNKS, Block, Chunk, ChunkSamples, DEFAULT_CHUNK_CELLS, Grid, GridError, MAX_CHUNK_CELLS,
-    MIN_CHUNK_CELLS, Neighbourhood, NeighbourhoodView, SpareSamples,
+    BOUND_BOX_CHUNKS, Block, DEFAULT_CHUNK_CELLS, Grid, GridChunk, GridError, GridSamples, MAX_CHUNK_CELLS,
+    MIN_CHUNK_CELLS, Neighbourhood, NeighbourhoodView, SamplePool,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 #[cfg(feature = "std")]

@@ -12,7 +12,7 @@ mod tests;
 
 use crate::{
     cell::{CaseIndex, Corner, Edge},
-    grid::{Chunk, ChunkSamples, Grid, border::Border},
+    grid::{Grid, GridChunk, GridSamples, border::Border},
     mesher::crossing_fraction,
     sample::{Voxel, Weight},
 };
@@ -44,10 +44,10 @@ pub struct RayHit {
 /// ray along a triangle's plane or through its very edge may count as a hit or as a miss.
 ///
 /// ```
-/// use marchless::{BrushShape, Grid, Operation, Stamp, ray_cast};
+/// use marchless::{Grid, Operation, QuantisedShape, QuantisedStamp, ray_cast};
 ///
 /// let mut grid = Grid::<i16>::new(32)?;
-/// grid.apply(&Stamp::new(BrushShape::sphere([0.0; 3], 10.0)?, Operation::Add, 1));
+/// grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 10.0)?, Operation::Add, 1));
 /// let hit = ray_cast(&grid, 0.0, [30.0, 0.5, 0.5], [-1.0, 0.0, 0.0], 100.0).expect("the ball is in its way");
 /// assert!((hit.distance - 20.0).abs() < 0.1);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
@@ -134,7 +134,7 @@ struct Surface<'a, W: Weight> {
 #[derive(Clone, Copy)]
 enum Part<'a, W> {
     Uniform(Voxel<W>),
-    Samples(&'a ChunkSamples<W>),
+    Samples(&'a GridSamples<W>),
 }
 
 impl<'a, W: Weight> Surface<'a, W> {
@@ -143,8 +143,8 @@ impl<'a, W: Weight> Surface<'a, W> {
             let offset = corner.offset();
             let position = [0, 1, 2].map(|axis| position[axis].saturating_add(offset[axis].into()));
             match grid.seen_chunk(position) {
-                Some(Chunk::Uniform(voxel)) => Part::Uniform(*voxel),
-                Some(Chunk::Samples(samples)) => Part::Samples(samples),
+                Some(GridChunk::Uniform(voxel)) => Part::Uniform(*voxel),
+                Some(GridChunk::Samples(samples)) => Part::Samples(samples),
                 // Beyond the bounds, all that a chunk's cells read lies on the outermost planes and is the same.
                 None => Part::Uniform(grid.as_meshed(grid.chunk_region(position).min, isovalue)),
             }
@@ -207,7 +207,7 @@ impl<'a, W: Weight> Surface<'a, W> {
     /// Whether the cell at `local` lies within the chunk's own samples and has all its corners on one side. This skips
     /// most cells of a ray quickly.
     fn is_one_sided(&self, local: [i32; 3], threshold: W::Threshold) -> bool {
-        let Part::Samples(ChunkSamples { weights, .. }) = self.chunks[0] else { return false };
+        let Part::Samples(GridSamples { weights, .. }) = self.chunks[0] else { return false };
         if self.border.is_some() || local.iter().any(|&v| v + 1 >= self.cells) {
             return false;
         }

@@ -113,7 +113,7 @@ pub trait Source: Any + Send + Sync {
     /// but [`Bound::Mixed`] says here as well that all samples would be 3 or more, or −3 or less. By default this is what
     /// [`Source::bound`] says of the region and four points around it.
     ///
-    /// [`Chunk::from_source`](crate::Chunk::from_source) says in which order both bounds are asked. Code that streams chunks
+    /// [`GridChunk::from_source`](crate::GridChunk::from_source) says in which order both bounds are asked. Code that streams chunks
     /// asks [`Source::bound`] on the thread that must not wait, and this one in the job that samples.
     fn bound_closely(&self, region: &SourceRegion) -> Bound {
         self.bound(&region.grown(BOUND_MARGIN))

@@ -7,7 +7,7 @@ use core::{
 use std::alloc::System;
 
 use fastrand::Rng;
-use marchless::{Block, Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
+use marchless::{Block, Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 
 thread_local! {
     /// How often this thread has allocated, and how many bytes; the test harness has threads of its own.
@@ -100,7 +100,7 @@ fn warm_meshing_of_a_chunk_allocates_nothing() {
     let shape = Shape::cube(16).expect("16 is small");
     let mut grid = Grid::<i16>::new(16).expect("16 is allowed");
     for position in [[0, 0, 0], [1, 0, 0], [0, -1, 1]] {
-        let chunk = Chunk::from_samples(weights(shape, 4.0), vec![2; shape.len()], 16).expect("the lengths fit");
+        let chunk = GridChunk::from_samples(weights(shape, 4.0), vec![2; shape.len()], 16).expect("the lengths fit");
         grid.insert(position, chunk).expect("the grid has no bounds");
     }
     let neighbourhood = grid.neighbourhood([0, 0, 0]);

@@ -100,7 +100,7 @@ struct Vertex {
 }
 
 /// A chunk with a surface, all of it.
-pub(crate) struct Chunk {
+pub(crate) struct GridChunk {
     pub(crate) number: u64,
     /// Its first and its last samples, by the mesher's count.
     pub(crate) samples: [[u32; 3]; 2],
@@ -118,7 +118,7 @@ impl Split {
     ///
     /// # Errors
     /// [`Error::MeshMemory`].
-    pub(crate) fn take(&mut self, slab: u32, piece: &MeshBuffer) -> Result<Vec<Chunk>, Error> {
+    pub(crate) fn take(&mut self, slab: u32, piece: &MeshBuffer) -> Result<Vec<GridChunk>, Error> {
         let vertices = piece.positions.iter().zip(&piece.normals);
         let vertices = vertices.map(|(&position, &normal)| Vertex { position, normal, last: None });
         self.recent.extend(vertices).map_err(|_| Error::MeshMemory)?;
@@ -151,7 +151,7 @@ impl Split {
         let parts = self.layer.drain(..).enumerate().filter_map(|(place, mesh)| {
             let chunk = [(place % width) as u32, (place / width) as u32, layer];
             let (number, samples) = (self.chunks.number(chunk), self.chunks.samples(chunk));
-            Some(Chunk { number, samples, mesh: *mesh? })
+            Some(GridChunk { number, samples, mesh: *mesh? })
         });
         Ok(parts.collect())
     }

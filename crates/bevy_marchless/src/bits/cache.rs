@@ -10,18 +10,18 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
 use bevy_ecs::prelude::*;
 use marchless::bits::BitGrid;
-use marchless::{Chunk, ChunkSamples, Region, Samples, Shape, Weight as _};
+use marchless::{GridChunk, GridSamples, Region, Samples, Shape, Weight as _};
 
 use super::TerrainBitsError;
-use super::part::Ground;
+use super::part::SolidQuery;
 
 /// The bits of those chunks of a terrain that somebody has asked for.
 #[derive(Component, Default)]
-pub(crate) struct BitsCache(Mutex<Entries>);
+pub(crate) struct BitsCache(Mutex<CacheEntries>);
 
 #[derive(Default)]
-struct Entries {
-    chunks: BTreeMap<[i32; 3], Entry>,
+struct CacheEntries {
+    chunks: BTreeMap<[i32; 3], CacheEntry>,
     /// When there are this many, those of samples that are gone are pruned.
     prune_at: usize,
 }
@@ -29,10 +29,10 @@ struct Entries {
 /// The bits of this many chunks are kept without looking which of them are stale.
 const FEW: usize = 64;
 
-struct Entry {
+struct CacheEntry {
     /// What the bits are derived from.
-    samples: Weak<ChunkSamples<i16>>,
-    recipe: Recipe,
+    samples: Weak<GridSamples<i16>>,
+    settings: BitsSettings,
     bits: Arc<OnceLock<Derived>>,
 }
 
@@ -49,12 +49,12 @@ pub(super) enum Derived {
 #[derive(Clone, Debug)]
 pub(super) enum ChunkBits {
     Uniform(bool),
-    Lazy { samples: Arc<ChunkSamples<i16>>, recipe: Recipe, bits: Arc<OnceLock<Derived>> },
+    Lazy { samples: Arc<GridSamples<i16>>, settings: BitsSettings, bits: Arc<OnceLock<Derived>> },
 }
 
 /// What bits depend on besides samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Recipe {
+pub(super) struct BitsSettings {
     isovalue: f32,
     cells: u32,
     /// For each axis, whether the chunk's lowest layer lies on the terrain's outermost plane, where all is air.
@@ -63,10 +63,16 @@ pub(super) struct Recipe {
 
 impl BitsCache {
     /// Where the bits of a chunk with these samples are, or will be.
-    fn place(&self, position: [i32; 3], samples: &Arc<ChunkSamples<i16>>, recipe: Recipe) -> Arc<OnceLock<Derived>> {
+    fn place(
+        &self,
+        position: [i32; 3],
+        samples: &Arc<GridSamples<i16>>,
+        settings: BitsSettings,
+    ) -> Arc<OnceLock<Derived>> {
         let mut entries = self.lock();
-        let is_current =
-            |entry: &&Entry| core::ptr::eq(entry.samples.as_ptr(), Arc::as_ptr(samples)) && entry.recipe == recipe;
+        let is_current = |entry: &&CacheEntry| {
+            core::ptr::eq(entry.samples.as_ptr(), Arc::as_ptr(samples)) && entry.settings == settings
+        };
         if let Some(entry) = entries.chunks.get(&position).filter(is_current) {
             return entry.bits.clone();
         }
@@ -75,11 +81,11 @@ impl BitsCache {
             entries.chunks.retain(|_, entry| entry.samples.strong_count() > 0);
             entries.prune_at = 2 * entries.chunks.len() + FEW;
         }
-        entries.chunks.insert(position, Entry { samples: Arc::downgrade(samples), recipe, bits: bits.clone() });
+        entries.chunks.insert(position, CacheEntry { samples: Arc::downgrade(samples), settings, bits: bits.clone() });
         bits
     }
 
-    fn lock(&self) -> MutexGuard<'_, Entries> {
+    fn lock(&self) -> MutexGuard<'_, CacheEntries> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -90,18 +96,18 @@ impl ChunkBits {
     /// # Errors
     /// [`TerrainBitsError::NotFilled`].
     pub(super) fn new(
-        Ground { grid, cache, isovalue }: Ground<'_>,
+        SolidQuery { grid, cache, isovalue }: SolidQuery<'_>,
         position: [i32; 3],
     ) -> Result<Self, TerrainBitsError> {
         match grid.chunk(position) {
             None => Err(TerrainBitsError::NotFilled { chunk: position.into() }),
-            Some(Chunk::Uniform(voxel)) => Ok(Self::Uniform(voxel.weight.to_voxels() < isovalue)),
-            Some(Chunk::Samples(samples)) => {
+            Some(GridChunk::Uniform(voxel)) => Ok(Self::Uniform(voxel.weight.to_voxels() < isovalue)),
+            Some(GridChunk::Samples(samples)) => {
                 let lowest =
                     grid.bounds().map_or([false; 3], |bounds| [0, 1, 2].map(|axis| position[axis] == bounds.min[axis]));
-                let recipe = Recipe { isovalue, cells: grid.chunk_cells(), lowest };
-                let bits = cache.place(position, samples, recipe);
-                Ok(Self::Lazy { samples: samples.clone(), recipe, bits })
+                let settings = BitsSettings { isovalue, cells: grid.chunk_cells(), lowest };
+                let bits = cache.place(position, samples, settings);
+                Ok(Self::Lazy { samples: samples.clone(), settings, bits })
             }
         }
     }
@@ -114,19 +120,19 @@ impl ChunkBits {
         match self {
             Self::Uniform(true) => Ok(&Derived::Uniform(true)),
             Self::Uniform(false) => Ok(&Derived::Uniform(false)),
-            Self::Lazy { samples, recipe, bits } => {
+            Self::Lazy { samples, settings, bits } => {
                 if let Some(derived) = bits.get() {
                     return Ok(derived);
                 }
-                let derived = recipe.derive(samples)?;
+                let derived = settings.derive(samples)?;
                 Ok(bits.get_or_init(|| derived))
             }
         }
     }
 }
 
-impl Recipe {
-    fn derive(&self, samples: &ChunkSamples<i16>) -> Result<Derived, TerrainBitsError> {
+impl BitsSettings {
+    fn derive(&self, samples: &GridSamples<i16>) -> Result<Derived, TerrainBitsError> {
         let shape = Shape::cube(self.cells).expect("a chunk has samples");
         let samples = Samples::new(shape, &samples.weights).expect("the grid has checked their number");
         let mut bits = BitGrid::from_samples(samples, self.isovalue)?;
@@ -154,7 +160,7 @@ mod tests {
     }
 
     fn place(grid: &Grid<i16>, cache: &BitsCache, isovalue: f32) -> Arc<OnceLock<Derived>> {
-        match ChunkBits::new(Ground { grid, cache, isovalue }, [0; 3]).expect("it is filled") {
+        match ChunkBits::new(SolidQuery { grid, cache, isovalue }, [0; 3]).expect("it is filled") {
             ChunkBits::Lazy { bits, .. } => bits,
             ChunkBits::Uniform(_) => panic!("it has samples"),
         }
@@ -185,8 +191,8 @@ mod tests {
         let (mut grid, cache) = (Grid::new(8).unwrap(), BitsCache::default());
         for x in 0..1_000 {
             grid.set([8 * x, 0, 0], Voxel::new(-256, 0)).unwrap();
-            ChunkBits::new(Ground { grid: &grid, cache: &cache, isovalue: 0.0 }, [x, 0, 0]).unwrap();
-            grid.unload([x, 0, 0]);
+            ChunkBits::new(SolidQuery { grid: &grid, cache: &cache, isovalue: 0.0 }, [x, 0, 0]).unwrap();
+            grid.remove_clean([x, 0, 0]);
         }
         assert!(cache.lock().chunks.len() <= FEW);
     }
@@ -194,8 +200,8 @@ mod tests {
     #[test]
     fn a_chunk_that_is_uniform_costs_no_bits() {
         let (mut grid, cache) = (one_chunk(), BitsCache::default());
-        grid.insert([0; 3], Chunk::AIR).unwrap();
-        let bits = |grid: &Grid<i16>| ChunkBits::new(Ground { grid, cache: &cache, isovalue: 0.0 }, [0; 3]);
+        grid.insert([0; 3], GridChunk::AIR).unwrap();
+        let bits = |grid: &Grid<i16>| ChunkBits::new(SolidQuery { grid, cache: &cache, isovalue: 0.0 }, [0; 3]);
         assert!(matches!(bits(&grid), Ok(ChunkBits::Uniform(false))));
         assert!(cache.lock().chunks.is_empty());
         // Samples that differ, but are all air.

@@ -1,4 +1,4 @@
-//! [`Part`]: what a question reads of one chunk.
+//! [`ChunkPart`]: what a question reads of one chunk.
 
 use bevy_math::DVec3;
 use marchless::bits::BitGrid;
@@ -9,7 +9,7 @@ use super::cache::{BitsCache, ChunkBits, Derived};
 
 /// What is solid in a terrain, and where the bits of it are kept.
 #[derive(Clone, Copy)]
-pub(super) struct Ground<'a> {
+pub(super) struct SolidQuery<'a> {
     pub(super) grid: &'a Grid<i16>,
     pub(super) cache: &'a BitsCache,
     /// In voxels.
@@ -18,7 +18,7 @@ pub(super) struct Ground<'a> {
 
 /// What a question reads of one chunk; everything in the terrain's lattice.
 #[derive(Clone, Debug)]
-pub(super) struct Part {
+pub(super) struct ChunkPart {
     /// Points of the chunk; never empty.
     region: Region,
     /// The chunk's lowest point.
@@ -33,8 +33,11 @@ pub(super) fn within(grid: &Grid<i16>, region: Region) -> Region {
 }
 
 /// What `region` has in common with each chunk; beyond the chunks all is air.
-pub(super) fn parts(ground: Ground<'_>, region: Region) -> impl Iterator<Item = Result<Part, TerrainBitsError>> + '_ {
-    let Ground { grid, .. } = ground;
+pub(super) fn parts(
+    query: SolidQuery<'_>,
+    region: Region,
+) -> impl Iterator<Item = Result<ChunkPart, TerrainBitsError>> + '_ {
+    let SolidQuery { grid, .. } = query;
     let inside = within(grid, region);
     let chunks = if inside.is_empty() {
         NOTHING
@@ -44,14 +47,14 @@ pub(super) fn parts(ground: Ground<'_>, region: Region) -> impl Iterator<Item = 
     };
     chunks.points().map(move |position| {
         let chunk = grid.chunk_region(position);
-        let bits = ChunkBits::new(ground, position)?;
-        Ok(Part { region: chunk.intersection(&inside), origin: chunk.min, bits })
+        let bits = ChunkBits::new(query, position)?;
+        Ok(ChunkPart { region: chunk.intersection(&inside), origin: chunk.min, bits })
     })
 }
 
 const NOTHING: Region = Region::new([0; 3], [0; 3]);
 
-impl Part {
+impl ChunkPart {
     /// Whether all of it is solid.
     pub(super) fn is_solid(&self) -> Result<bool, TerrainBitsError> {
         Ok(match self.bits.get()? {

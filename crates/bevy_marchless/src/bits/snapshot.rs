@@ -8,8 +8,8 @@ use bevy_tasks::{AsyncComputeTaskPool, Task, TaskPool};
 use marchless::bits::{BitGrid, Connectivity};
 use marchless::{Region, Shape};
 
-use super::part::Part;
-use super::{Medium, Piece, TerrainBits, TerrainBitsError};
+use super::part::ChunkPart;
+use super::{Island, Phase, TerrainBits, TerrainBitsError};
 
 /// A box of a terrain as it was when the snapshot was taken, whatever becomes of the terrain: what
 /// [`TerrainBits`] answers about boxes, on any thread.
@@ -22,7 +22,7 @@ pub struct BitsSnapshot {
     pub(super) region: Region,
     /// What of it may be solid.
     pub(super) inside: Region,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<ChunkPart>,
 }
 
 impl BitsSnapshot {
@@ -35,24 +35,25 @@ impl BitsSnapshot {
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
+    /// use bevy_marchless::bits::prelude::*;
     /// # use bevy_ecs::prelude::*;
     /// use bevy_tasks::{Task, futures::check_ready};
     ///
     /// #[derive(Resource, Default)]
-    /// struct Search(Option<Task<Result<Vec<Piece>, TerrainBitsError>>>);
+    /// struct Search(Option<Task<Result<Vec<Island>, TerrainBitsError>>>);
     ///
     /// fn ask(mut edits: MessageReader<TerrainEdited>, bits: TerrainBits, mut search: ResMut<Search>) {
     ///     for edited in edits.read() {
     ///         let region = Region::new(edited.min.to_array(), edited.max.to_array()).grown(64, 64);
     ///         if let Ok(snapshot) = bits.snapshot(edited.terrain, region) {
-    ///             search.0 = Some(snapshot.in_task(|snapshot| snapshot.pieces()));
+    ///             search.0 = Some(snapshot.in_task(|snapshot| snapshot.islands()));
     ///         }
     ///     }
     /// }
     ///
     /// fn answer(mut search: ResMut<Search>) {
-    ///     if let Some(Ok(pieces)) = search.0.as_mut().and_then(check_ready) {
-    ///         println!("{} pieces hang free", pieces.iter().filter(|piece| !piece.is_held()).count());
+    ///     if let Some(Ok(islands)) = search.0.as_mut().and_then(check_ready) {
+    ///         println!("{} islands hang free", islands.iter().filter(|island| !island.touches_boundary()).count());
     ///         search.0 = None;
     ///     }
     /// }
@@ -76,47 +77,47 @@ impl BitsSnapshot {
     ///
     /// # Errors
     /// [`TerrainBitsError::TooLarge`].
-    pub fn connected(&self, a: IVec3, b: IVec3, medium: Medium) -> Result<bool, TerrainBitsError> {
+    pub fn connected(&self, a: IVec3, b: IVec3, medium: Phase) -> Result<bool, TerrainBitsError> {
         let (region, connectivity) = match medium {
-            Medium::Solid => (self.inside, Connectivity::Six),
-            Medium::Air => (self.region, Connectivity::Eighteen),
+            Phase::Solid => (self.inside, Connectivity::Six),
+            Phase::Air => (self.region, Connectivity::Eighteen),
         };
         let ends = [a, b].map(|end| end.to_array());
         if !ends.iter().all(|end| region.contains(*end)) {
             return Ok(false);
         }
         let mut mask = self.assemble(region)?;
-        if medium == Medium::Air {
+        if medium == Phase::Air {
             mask.invert();
         }
         let [a, b] = ends.map(|end| [0, 1, 2].map(|axis| end[axis].abs_diff(region.min[axis])));
         Ok(mask.get(a) && mask.get(b) && mask.flood(&[a], connectivity)?.get(b))
     }
 
-    /// The pieces that what is solid in the box falls into, numbered by their first points, x fastest.
+    /// The islands that what is solid in the box falls into, numbered by their first points, x fastest.
     ///
-    /// Solid points are neighbours along the axes, as surfaces have it: pieces touch at edges and corners at most, and
-    /// the mesh of each is closed. [`Piece::is_held`] tells which of them may go on beyond the box.
+    /// Solid points are neighbours along the axes, as surfaces have it: islands touch at edges and corners at most, and
+    /// the mesh of each is closed. [`Island::touches_boundary`] tells which of them may go on beyond the box.
     ///
     /// # Errors
     /// [`TerrainBitsError::TooLarge`].
-    pub fn pieces(&self) -> Result<Vec<Piece>, TerrainBitsError> {
+    pub fn islands(&self) -> Result<Vec<Island>, TerrainBitsError> {
         if self.inside.is_empty() {
             return Ok(Vec::new());
         }
         let solid = Arc::new(self.assemble(self.inside)?);
         let components = solid.components(Connectivity::Six);
-        Ok(components.iter().map(|component| Piece::new(*component, self.inside, &solid)).collect())
+        Ok(components.iter().map(|component| Island::new(*component, self.inside, &solid)).collect())
     }
 
-    /// Those of the [pieces](Self::pieces) that hang free.
+    /// Those of the [islands](Self::islands) that hang free.
     ///
     /// # Errors
     /// [`TerrainBitsError::TooLarge`].
-    pub fn loose_pieces(&self) -> Result<Vec<Piece>, TerrainBitsError> {
-        let mut pieces = self.pieces()?;
-        pieces.retain(|piece| !piece.is_held());
-        Ok(pieces)
+    pub fn loose_islands(&self) -> Result<Vec<Island>, TerrainBitsError> {
+        let mut islands = self.islands()?;
+        islands.retain(|island| !island.touches_boundary());
+        Ok(islands)
     }
 
     fn assemble(&self, region: Region) -> Result<BitGrid, TerrainBitsError> {

@@ -10,7 +10,7 @@ use marchless::Edit;
 use super::{Stamp, TerrainEdited};
 use crate::budget::FrameBudget;
 use crate::schedule::NewEdits;
-use crate::stats::{Since, TerrainStats};
+use crate::stats::{RequestTime, TerrainStats};
 use crate::terrain::TerrainVolume;
 use crate::volume::Edits;
 
@@ -20,8 +20,8 @@ pub(super) struct StampQueue(Vec<Queued>);
 
 struct Queued {
     terrain: Entity,
-    stamp: marchless::Stamp,
-    since: Since,
+    stamp: marchless::QuantisedStamp,
+    since: RequestTime,
     /// For which of the worlds that the terrain was to be, and for the surface at which isovalue; known when its turn has
     /// come once, so that it makes no difference how long it waits.
     request: Option<(u64, f32)>,

@@ -23,7 +23,7 @@ pub(crate) struct ChunkQueue {
     /// Before all others.
     first: UniqueQueue,
     /// Those of each viewer; `None` has those that no viewer asks for, too.
-    agendas: BTreeMap<ViewId, Agenda>,
+    queues: BTreeMap<ViewId, PriorityQueue>,
     members: HashSet<ChunkKey>,
     /// Whose turn it was last.
     last: ViewId,
@@ -70,7 +70,7 @@ impl ChunkQueue {
 
     /// How many chunks wait for a viewer.
     pub(crate) fn len_of(&self, id: ViewId) -> usize {
-        self.agendas.get(&id).map_or(0, |agenda| agenda.soon.len() + agenda.later.len())
+        self.queues.get(&id).map_or(0, |queue| queue.soon.len() + queue.later.len())
     }
 
     /// All chunks, in no order; one that has been put first may come twice.
@@ -86,7 +86,7 @@ impl ChunkQueue {
     pub(crate) fn add(&mut self, key: ChunkKey, cover: &Cover) {
         if self.members.insert(key) {
             let (id, urgency) = cover.most_urgent(key.position).unwrap_or_default();
-            self.agendas.entry(id).or_default().add(key, urgency);
+            self.queues.entry(id).or_default().add(key, urgency);
         }
     }
 
@@ -98,20 +98,20 @@ impl ChunkQueue {
     /// Adds one of many chunks that a viewer asks for, to be sorted later.
     pub(crate) fn add_unsorted(&mut self, key: ChunkKey, id: ViewId) {
         if self.members.insert(key) {
-            self.agendas.entry(id).or_default().later.push(key);
+            self.queues.entry(id).or_default().later.push(key);
         }
     }
 
     /// Notes that it has become another question what is urgent for a viewer.
     pub(crate) fn sort_again(&mut self, id: ViewId) {
-        if let Some(agenda) = self.agendas.get_mut(&id) {
-            agenda.sort_again();
+        if let Some(queue) = self.queues.get_mut(&id) {
+            queue.sort_again();
         }
     }
 
     /// Hands the chunks of a viewer that is gone to others.
     pub(crate) fn remove_view(&mut self, id: ViewId, cover: &Cover) {
-        let Some(Agenda { soon, later, .. }) = self.agendas.remove(&id) else { return };
+        let Some(PriorityQueue { soon, later, .. }) = self.queues.remove(&id) else { return };
         for key in soon.into_iter().map(|(_, Reverse(key))| key).chain(later) {
             self.members.remove(&key);
             self.add(key, cover);
@@ -128,24 +128,24 @@ impl ChunkQueue {
         if self.members.is_empty() {
             return None;
         }
-        let Self { agendas, members, last, .. } = self;
+        let Self { queues, members, last, .. } = self;
         loop {
             let behind = (Bound::Excluded(*last), Bound::Unbounded);
-            let id = agendas.range(behind).map(|(id, _)| *id).next().or_else(|| agendas.keys().next().copied())?;
+            let id = queues.range(behind).map(|(id, _)| *id).next().or_else(|| queues.keys().next().copied())?;
             *last = id;
-            let Entry::Occupied(mut agenda) = agendas.entry(id) else { return None };
-            let key = agenda.get_mut().pop(cover.view(id), members, &waits);
+            let Entry::Occupied(mut queue) = queues.entry(id) else { return None };
+            let key = queue.get_mut().pop(cover.view(id), members, &waits);
             if key.is_some() {
                 return key;
             }
-            agenda.remove();
+            queue.remove();
         }
     }
 }
 
 /// The chunks of one viewer.
 #[derive(Debug)]
-struct Agenda {
+struct PriorityQueue {
     /// The most urgent ones, the first at the end.
     soon: Vec<(Reverse<u32>, Reverse<ChunkKey>)>,
     is_sorted: bool,
@@ -156,13 +156,13 @@ struct Agenda {
     prune_at: usize,
 }
 
-impl Default for Agenda {
+impl Default for PriorityQueue {
     fn default() -> Self {
         Self { soon: Vec::new(), is_sorted: true, later: Vec::new(), bar: 0, prune_at: FEW }
     }
 }
 
-impl Agenda {
+impl PriorityQueue {
     fn add(&mut self, key: ChunkKey, urgency: u32) {
         if urgency < self.bar {
             self.soon.push((Reverse(urgency), Reverse(key)));
@@ -238,10 +238,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::cover::Range;
+    use crate::cover::LoadRegion;
 
     fn view(middle: f64) -> View {
-        let range = Range::ellipsoid([middle, 0.5, 0.5], [40.0; 3], Region::new([-90; 3], [90; 3]));
+        let range = LoadRegion::ellipsoid([middle, 0.5, 0.5], [40.0; 3], Region::new([-90; 3], [90; 3]));
         View::new(range, 0.0, None, [1.0, 0.0, 0.0])
     }
 

@@ -2,7 +2,7 @@
 
 use core::ops;
 
-use super::{View, Wanted};
+use super::{Residency, View};
 
 /// Chunks in rows along x.
 #[derive(Clone, Debug, Default)]
@@ -103,9 +103,9 @@ impl Borders {
     }
 
     /// The chunks of which more may be wanted than with `old` borders, and how much.
-    pub(super) fn come(&self, old: &Self, mut take: impl FnMut([i32; 3], Wanted)) {
-        self.drawn.difference(&old.drawn, None, &mut |position| take(position, Wanted::Mesh));
-        let mut take = |position| take(position, Wanted::Samples);
+    pub(super) fn come(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
+        self.drawn.difference(&old.drawn, None, &mut |position| take(position, Residency::Mesh));
+        let mut take = |position| take(position, Residency::Samples);
         self.around.difference(&old.around, None, &mut take);
         if self.samples.is_some() || old.samples.is_some() {
             self.samples_wanted().difference(old.samples_wanted(), None, &mut take);
@@ -118,10 +118,10 @@ impl Borders {
     }
 
     /// The chunks of which less may be wanted than with `old` borders, and how much at most.
-    pub(super) fn go(&self, old: &Self, mut take: impl FnMut([i32; 3], Wanted)) {
+    pub(super) fn go(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
         let stays_around = Some(&self.stays_around);
-        old.stays.difference(&self.stays, stays_around, &mut |position| take(position, Wanted::Samples));
-        let mut take = |position| take(position, Wanted::Gone);
+        old.stays.difference(&self.stays, stays_around, &mut |position| take(position, Residency::Samples));
+        let mut take = |position| take(position, Residency::Gone);
         old.stays_around.difference(&self.stays_around, None, &mut take);
         if self.samples.is_some() || old.samples.is_some() {
             old.samples_stay().difference(self.samples_stay(), None, &mut take);

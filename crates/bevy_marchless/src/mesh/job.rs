@@ -13,8 +13,8 @@ use bevy_tasks::ComputeTaskPool;
 use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, NeighbourhoodView};
 
 use super::ATTRIBUTE_MATERIAL;
-use super::rooms::{AssetRoom, MeshRoom, MeshRooms};
-use crate::volume::{Colors, Meshed};
+use super::pool::{MeshPool, PooledAsset, PooledMesh};
+use crate::volume::{ChunkMesh, Colors};
 
 /// What the asset of a mesh is like.
 #[derive(Clone)]
@@ -25,16 +25,16 @@ pub(crate) struct AssetStyle {
     pub(crate) usages: RenderAssetUsages,
 }
 
-/// Meshes a chunk. `style`: of its asset; `None` where none is wanted. `rooms`: memory for the mesh; without it,
+/// Meshes a chunk. `style`: of its asset; `None` where none is wanted. `pool`: memory for the mesh; without it,
 /// the mesh takes no more than it needs.
 pub(crate) fn mesh_chunk(
     samples: &NeighbourhoodView<'_>,
     position: [i32; 3],
     settings: &MeshSettings,
     style: Option<&AssetStyle>,
-    rooms: Option<&MeshRooms>,
-) -> Meshed {
-    mesh_with(position, style, rooms, |mesher, block, out| samples.mesh(mesher, block, settings, out))
+    pool: Option<&MeshPool>,
+) -> ChunkMesh {
+    mesh_with(position, style, pool, |mesher, block, out| samples.mesh(mesher, block, settings, out))
 }
 
 /// Meshes chunks at once, with the help of the compute pool where there is one; the result is in the order of positions.
@@ -42,13 +42,13 @@ pub(crate) fn mesh_now(
     chunks: &[([i32; 3], NeighbourhoodView<'_>)],
     settings: &MeshSettings,
     style: Option<&AssetStyle>,
-    rooms: &MeshRooms,
-) -> Vec<Meshed> {
+    pool: &MeshPool,
+) -> Vec<ChunkMesh> {
     let next = AtomicUsize::new(0);
     // Each thread takes the next one when it is free: to wake others for each would take longer.
     let take = || {
         let (position, samples) = chunks.get(next.fetch_add(1, Ordering::Relaxed))?;
-        Some(mesh_chunk(samples, *position, settings, style, Some(rooms)))
+        Some(mesh_chunk(samples, *position, settings, style, Some(pool)))
     };
     let Some(pool) = ComputeTaskPool::try_get().filter(|_| chunks.len() > 1) else {
         return iter::from_fn(take).collect();
@@ -66,10 +66,10 @@ pub(crate) fn mesh_now(
 }
 
 /// The same mesh in other colours.
-pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, style: Option<&AssetStyle>) -> Meshed {
+pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, style: Option<&AssetStyle>) -> ChunkMesh {
     let start = Instant::now();
-    let mesh = style.map(|style| to_asset(&geometry, style, AssetRoom::default()));
-    Meshed { position, geometry, mesh, time: start.elapsed() }
+    let mesh = style.map(|style| to_asset(&geometry, style, PooledAsset::default()));
+    ChunkMesh { position, geometry, mesh, time: start.elapsed() }
 }
 
 /// Runs `mesh` with this thread's scratch memory, and makes an asset of what comes out. A failure is reported and
@@ -77,30 +77,30 @@ pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, style: Opti
 pub(super) fn mesh_with(
     position: [i32; 3],
     style: Option<&AssetStyle>,
-    rooms: Option<&MeshRooms>,
+    pool: Option<&MeshPool>,
     mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
-) -> Meshed {
+) -> ChunkMesh {
     thread_local! {
         static SCRATCH: RefCell<(Mesher, Block<i16>, MeshBuffer)> =
             RefCell::new((Mesher::new(), Block::new(), MeshBuffer::new()));
     }
     let start = Instant::now();
-    // A copy takes no more memory than the mesh needs, or than its room has; a buffer that has grown does.
-    let room = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
+    // A copy takes no more memory than the mesh needs, or than its pooled has; a buffer that has grown does.
+    let pooled = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
         Ok(()) => {
-            let mut room = rooms.map_or_else(MeshRoom::default, |rooms| rooms.room_for(geometry));
-            copy(geometry, &mut room.geometry);
-            room
+            let mut pooled = pool.map_or_else(PooledMesh::default, |pool| pool.take_for(geometry));
+            copy(geometry, &mut pooled.geometry);
+            pooled
         }
         Err(error) => {
             bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
-            MeshRoom::default()
+            PooledMesh::default()
         }
     });
-    let MeshRoom { geometry, asset } = room;
+    let PooledMesh { geometry, asset } = pooled;
     let mesh = style.filter(|_| !geometry.is_empty()).map(|style| to_asset(&geometry, style, asset));
     let geometry = Arc::new(geometry);
-    Meshed { position, geometry, mesh, time: start.elapsed() }
+    ChunkMesh { position, geometry, mesh, time: start.elapsed() }
 }
 
 fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {
@@ -114,31 +114,31 @@ fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {
 
 /// A mesh as an asset: positions in voxels, colours and materials a vertex, and the indices, in half the bytes
 /// where there are few enough vertices.
-fn to_asset(geometry: &MeshBuffer, style: &AssetStyle, room: AssetRoom) -> Mesh {
+fn to_asset(geometry: &MeshBuffer, style: &AssetStyle, pooled: PooledAsset) -> Mesh {
     let MeshBuffer { positions, normals, materials, indices, bounds } = geometry;
     let indices = if positions.len() <= usize::from(u16::MAX) {
-        Indices::U16(filled(room.indices, indices.iter().map(|&index| index as u16)))
+        Indices::U16(filled(pooled.indices, indices.iter().map(|&index| index as u16)))
     } else {
         Indices::U32(indices.clone())
     };
     let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, style.usages)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, filled(room.positions, positions.iter().copied()))
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, filled(pooled.positions, positions.iter().copied()))
         .with_inserted_indices(indices);
     if !normals.is_empty() {
-        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, filled(room.normals, normals.iter().copied()));
+        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, filled(pooled.normals, normals.iter().copied()));
     }
     if !materials.is_empty() {
         let vertex_colors = materials.iter().map(|&material| style.colors[usize::from(material)]);
-        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, filled(room.colors, vertex_colors));
-        mesh.insert_attribute(ATTRIBUTE_MATERIAL, filled(room.materials, materials.iter().copied().map(u32::from)));
+        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, filled(pooled.colors, vertex_colors));
+        mesh.insert_attribute(ATTRIBUTE_MATERIAL, filled(pooled.materials, materials.iter().copied().map(u32::from)));
     }
     mesh.final_aabb = bounds.map(|[min, max]| Aabb3d::from_min_max(min, max));
     mesh
 }
 
-/// The items, in a room that is empty.
-fn filled<T>(mut room: Vec<T>, items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
-    room.reserve_exact(items.len());
-    room.extend(items);
-    room
+/// The items, in a pooled that is empty.
+fn filled<T>(mut pooled: Vec<T>, items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
+    pooled.reserve_exact(items.len());
+    pooled.extend(items);
+    pooled
 }

@@ -2,11 +2,11 @@
 
 use bevy_math::{DAffine3, DVec3, IVec3, Ray3d};
 
-use crate::place::PlaceItem;
+use crate::placement::PlacementItem;
 use crate::terrain::TerrainVolume;
 
 /// Whether a ray may hit a terrain. Never false where it does; true for endless terrains, whose boxes are huge.
-pub(super) fn may_hit(volume: &TerrainVolume, place: &PlaceItem, ray: Ray3d, max_distance: f32) -> bool {
+pub(super) fn may_hit(volume: &TerrainVolume, place: &PlacementItem, ray: Ray3d, max_distance: f32) -> bool {
     let Some(settings) = volume.settings() else { return false };
     let Some(planes) = volume.shown().planes() else { return true };
     let voxel_size = f64::from(settings.voxel_size);

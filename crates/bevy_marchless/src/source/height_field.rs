@@ -6,7 +6,7 @@ use marchless::{Bound, SourceRegion};
 #[cfg(feature = "png")]
 use super::strata::{Stratum, material_at, material_within};
 #[cfg(feature = "png")]
-use super::{ROOM, rows, world_box};
+use super::{BOUND_MARGIN, rows, world_box};
 
 #[cfg(feature = "png")]
 /// A height for each column, in world units.
@@ -97,7 +97,7 @@ pub(crate) fn fill(
 pub(crate) fn bound(field: &impl HeightField, strata: &[Stratum], region: &SourceRegion) -> Bound {
     let [x, [bottom, top], z] = world_box(region);
     let [lowest, highest] = field.range(x, z);
-    let room = ROOM * region.spacing;
+    let room = BOUND_MARGIN * region.spacing;
     if bottom > highest + room {
         Bound::Outside
     } else if top < lowest - room

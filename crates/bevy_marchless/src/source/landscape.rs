@@ -20,14 +20,14 @@ pub use layer::Layer;
 pub use material::{MaterialRule, Patches};
 pub use solid::{Caves, Solid, Tunnels};
 
-use self::body::{Body, Region, Window};
-use self::field::Places;
+use self::body::{Body, ColumnWindow, QueryBox};
+use self::field::FieldPoints;
 use self::material::Rules;
-use self::parts::{Line, Part, Row};
+use self::parts::{Line, PreparedBody, Row};
 use super::height_field::Column;
 use super::interval::Interval;
 use super::noise::default_strata;
-use super::{ROOM, SourceError, rows, world_box};
+use super::{BOUND_MARGIN, SourceError, rows, world_box};
 
 /// How deep layers and solids may be nested.
 const MOST_NESTED: u32 = 32;
@@ -99,6 +99,7 @@ impl Landscape {
     }
 
     /// How often noise was evaluated so far, by this landscape and its clones: once for each octave and point.
+    #[doc(hidden)]
     pub fn noise_calls(&self) -> u64 {
         self.compiled.noise_calls.load(Ordering::Relaxed)
     }
@@ -109,7 +110,7 @@ impl Landscape {
         let grounds = self.compiled.body.grounds();
         let field = grounds.first()?.columns.field();
         let mut height = [0.0];
-        field.values(&Places::Grid { xs: &[x], zs: &[z] }, &mut height, &mut calls);
+        field.values(&FieldPoints::Grid { xs: &[x], zs: &[z] }, &mut height, &mut calls);
         self.count(calls);
         Some(height[0])
     }
@@ -119,10 +120,17 @@ impl Landscape {
     }
 
     /// A region in world units; `reach` is how far distances are told apart.
-    fn region<'a>(&self, region: &SourceRegion, columns: Option<Window<'a>>) -> Region<'a> {
+    fn region<'a>(&self, region: &SourceRegion, columns: Option<ColumnWindow<'a>>) -> QueryBox<'a> {
         let sides = world_box(region).map(|[low, high]| Interval { low, high });
-        let reach = self.compiled.rules.deepest.max(ROOM * region.spacing);
-        Region { sides, spacing: region.spacing, reach, margin: ROOM * region.spacing, strictly: false, columns }
+        let reach = self.compiled.rules.deepest.max(BOUND_MARGIN * region.spacing);
+        QueryBox {
+            sides,
+            spacing: region.spacing,
+            reach,
+            margin: BOUND_MARGIN * region.spacing,
+            strictly: false,
+            columns,
+        }
     }
 
     /// The columns of each ground in a region.
@@ -131,12 +139,12 @@ impl Landscape {
     }
 
     /// What is certain in a region.
-    fn certain(&self, region: &Region, noisily: bool, calls: &mut u64) -> Bound {
+    fn certain(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> Bound {
         let known = self.compiled.body.known(region, noisily, calls);
-        if known.roomy.low >= 0.0 && known.distance.low >= 0.0 {
+        if known.with_margin.low >= 0.0 && known.distance.low >= 0.0 {
             return Bound::Outside;
         }
-        let material = if known.roomy.high < 0.0 && known.distance.high < 0.0 {
+        let material = if known.with_margin.high < 0.0 && known.distance.high < 0.0 {
             let depth = [-known.distance.high, -known.distance.low];
             known.matter.and_then(|matter| match u8::try_from(matter) {
                 Ok(material) => Some(material),
@@ -170,8 +178,8 @@ impl Source for Landscape {
         let columns = self.columns(samples, &mut calls);
         let width = samples.size[0] as usize;
         let part = [0..width, 0..samples.size[2] as usize];
-        let region = self.region(samples, Some(Window { columns: &columns, width, part }));
-        let mut body = Part::new(&self.compiled.body, samples, &region, &columns);
+        let region = self.region(samples, Some(ColumnWindow { columns: &columns, width, part }));
+        let mut body = PreparedBody::new(&self.compiled.body, samples, &region, &columns);
         let xs: Vec<f64> = (0..samples.size[0]).map(|x| samples.position([x, 0, 0])[0]).collect();
         let mut row = Row::new(width);
         let spacing = samples.spacing as f32;
@@ -201,15 +209,15 @@ impl Source for Landscape {
 
     fn bound_closely(&self, samples: &SourceRegion) -> Bound {
         let margin = CLOSE * samples.spacing;
-        let region = Region { margin, strictly: true, ..self.region(samples, None) };
+        let region = QueryBox { margin, strictly: true, ..self.region(samples, None) };
         let most = samples.size[0].max(samples.size[2]);
         let mut calls = 0;
         let mut bound = self.certain(&region, false, &mut calls);
         if bound == Bound::Mixed && !samples.is_empty() && most <= MOST_COLUMNS {
             let columns = self.columns(samples, &mut calls);
             let part = [0..samples.size[0] as usize, 0..samples.size[2] as usize];
-            let columns = Some(Window { columns: &columns, width: samples.size[0] as usize, part });
-            bound = self.certain(&Region { columns, ..region }, true, &mut calls);
+            let columns = Some(ColumnWindow { columns: &columns, width: samples.size[0] as usize, part });
+            bound = self.certain(&QueryBox { columns, ..region }, true, &mut calls);
         }
         self.count(calls);
         bound

@@ -3,7 +3,7 @@
 use bevy_math::DVec3;
 use marchless::{Bound, Source, SourceRegion};
 
-use super::{ROOM, world_box};
+use super::{BOUND_MARGIN, world_box};
 
 /// A formula with a bound: wherever it is evaluated, it changes by at most `constant` per world unit.
 ///
@@ -50,7 +50,7 @@ impl<F: Fn([f64; 3]) -> f64 + Send + Sync + 'static> Source for Lipschitz<F> {
         let [x, y, z] = world_box(region);
         let [min, max] = [0, 1].map(|end| DVec3::new(x[end], y[end], z[end]));
         let value = (self.field)(((min + max) / 2.0).to_array());
-        let change = self.constant * min.distance(max) / 2.0 + ROOM * region.spacing;
+        let change = self.constant * min.distance(max) / 2.0 + BOUND_MARGIN * region.spacing;
         if self.constant < 0.0 {
             Bound::Mixed
         } else if value > change {

@@ -102,6 +102,7 @@ impl NoiseHeights {
     }
 
     /// How often noise was evaluated so far, as of [`Landscape::noise_calls`].
+    #[doc(hidden)]
     pub fn noise_calls(&self) -> u64 {
         self.landscape.noise_calls()
     }
@@ -192,6 +193,7 @@ impl NoiseDensity {
     }
 
     /// How often noise was evaluated so far, as of [`Landscape::noise_calls`].
+    #[doc(hidden)]
     pub fn noise_calls(&self) -> u64 {
         self.landscape.noise_calls()
     }

@@ -2,7 +2,7 @@
 
 use super::Fractal;
 use super::interval::Interval;
-use super::perlin::{LIPSCHITZ_2D, LIPSCHITZ_3D, NoiseRow, Perlin, Share};
+use super::perlin::{LIPSCHITZ_2D, LIPSCHITZ_3D, NoiseRow, NoiseScale, Perlin};
 
 /// The noise may be as far off, for it is rounded to `f32`.
 const ROUNDING: f64 = 1e-6;
@@ -70,7 +70,7 @@ impl Octaves {
         row.reset(xs.len());
         for octave in &self.octaves {
             octave.places(xs, &mut row.places);
-            let share = Share {
+            let share = NoiseScale {
                 value: octave.amplitude as f32,
                 gradient: (octave.amplitude * octave.frequency) as f32,
                 ridged: self.ridged,

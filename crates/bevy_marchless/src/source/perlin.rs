@@ -47,13 +47,13 @@ pub(crate) struct Perlin {
 
 /// A coordinate: the lowest lattice point of its cell, the same modulo 256, and how far behind it.
 #[derive(Clone, Copy)]
-struct Place {
+struct LatticeCoordinate {
     cell: f64,
     index: usize,
     inside: f64,
 }
 
-impl Place {
+impl LatticeCoordinate {
     fn new(coordinate: f64) -> Self {
         if !coordinate.is_finite() {
             return Self { cell: coordinate, index: 0, inside: 0.0 };
@@ -102,7 +102,7 @@ impl NoiseRow {
 
 /// How noise is added to a row.
 #[derive(Clone, Copy)]
-pub(crate) struct Share {
+pub(crate) struct NoiseScale {
     /// What values are multiplied with.
     pub(crate) value: f32,
     /// What gradients are multiplied with.
@@ -111,7 +111,7 @@ pub(crate) struct Share {
     pub(crate) ridged: bool,
 }
 
-impl Share {
+impl NoiseScale {
     /// The noise itself.
     const WHOLE: Self = Self { value: 1.0, gradient: 1.0, ridged: false };
 }
@@ -131,8 +131,10 @@ struct Corners {
 
 impl Corners {
     fn new(y: f64, z: f64) -> Self {
-        let [y, z] = [Place::new(y), Place::new(z)];
-        let sides = |place: Place| [(1.0 - fade(place.inside), place.inside), (fade(place.inside), place.inside - 1.0)];
+        let [y, z] = [LatticeCoordinate::new(y), LatticeCoordinate::new(z)];
+        let sides = |place: LatticeCoordinate| {
+            [(1.0 - fade(place.inside), place.inside), (fade(place.inside), place.inside - 1.0)]
+        };
         let [[near_y, far_y], [near_z, far_z]] = [sides(y), sides(z)];
         let (slope_y, slope_z) = (fade_slope(y.inside), fade_slope(z.inside));
         Self {
@@ -173,7 +175,7 @@ impl Perlin {
     /// Passes on the noise at each x (ascending) of a row at `z`: its index and value.
     #[inline]
     pub(crate) fn row_2d(&self, xs: &[f64], z: f64, mut take: impl FnMut(usize, f64)) {
-        let z = Place::new(z);
+        let z = LatticeCoordinate::new(z);
         let fade_z = fade(z.inside);
         // What the two lattice points of one x add: the value where the row passes them, and how it changes.
         let edge = |index: usize| {
@@ -195,7 +197,7 @@ impl Perlin {
     }
 
     /// Adds the noise at each of the row's places (ascending along x), at `y` and `z`, and its gradient.
-    pub(crate) fn add_row_3d(&self, y: f64, z: f64, share: Share, row: &mut NoiseRow) {
+    pub(crate) fn add_row_3d(&self, y: f64, z: f64, share: NoiseScale, row: &mut NoiseRow) {
         let corners = Corners::new(y, z);
         let NoiseRow { value, gradient: [by_x, by_y, by_z], places, inside } = row;
         inside.resize(places.len(), 0.0);
@@ -217,11 +219,11 @@ impl Perlin {
 
     /// The noise at one place.
     pub(crate) fn value_3d(&self, x: f64, y: f64, z: f64) -> f64 {
-        let (corners, place) = (Corners::new(y, z), Place::new(x));
+        let (corners, place) = (Corners::new(y, z), LatticeCoordinate::new(x));
         let [low, high] = [place.index, (place.index + 1) & 255].map(|index| self.face(index, &corners));
         let (mut value, mut gradient) = ([0.0], [[0.0]; 3]);
         let gradient = gradient.each_mut().map(|value| &mut value[..]);
-        add::<false>(&[place.inside as f32], &low, &high, Share::WHOLE, &mut value, gradient);
+        add::<false>(&[place.inside as f32], &low, &high, NoiseScale::WHOLE, &mut value, gradient);
         f64::from(value[0])
     }
 
@@ -253,7 +255,7 @@ fn add<const RIDGED: bool>(
     inside: &[f32],
     low: &Face,
     high: &Face,
-    share: Share,
+    share: NoiseScale,
     values: &mut [f32],
     [by_x, by_y, by_z]: [&mut [f32]; 3],
 ) {
@@ -299,7 +301,7 @@ fn for_each_cell<T: Copy>(
         let (cell, index, low) = match next {
             Some(next) if x < next.0 + 1.0 => next,
             _ => {
-                let place = Place::new(x);
+                let place = LatticeCoordinate::new(x);
                 (place.cell, place.index, side(place.index))
             }
         };
@@ -332,7 +334,7 @@ mod tests {
         let mut row = NoiseRow::default();
         row.reset(xs.len());
         row.places.copy_from_slice(xs);
-        perlin.add_row_3d(y, z, Share::WHOLE, &mut row);
+        perlin.add_row_3d(y, z, NoiseScale::WHOLE, &mut row);
         row
     }
 

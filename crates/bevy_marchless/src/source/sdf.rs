@@ -4,7 +4,7 @@ use bevy_math::DVec3;
 use bevy_reflect::Reflect;
 use marchless::{Bound, Source, SourceRegion};
 
-use super::{ROOM, SourceError, check, check_length, check_position, rows, world_box};
+use super::{BOUND_MARGIN, SourceError, check, check_length, check_position, rows, world_box};
 
 /// A solid made of simple ones. Lengths and positions are in world units in the terrain's space.
 ///
@@ -387,7 +387,7 @@ impl Source for Sdf {
 
     fn bound(&self, region: &SourceRegion) -> Bound {
         let (center, radius) = ball_around(region);
-        let far = radius + ROOM * region.spacing;
+        let far = radius + BOUND_MARGIN * region.spacing;
         let (distance, _) = self.sample(center);
         if self.check().is_err() {
             Bound::Mixed

@@ -12,7 +12,7 @@ use crate::terrain::TerrainVolume;
 use crate::volume::Filled;
 
 /// Each update takes at least this many chunks of a terrain.
-const LEAST: usize = 4;
+const MIN_CHUNKS: usize = 4;
 
 /// Takes sampled chunks into their volumes, with the stamps that came before them.
 pub(super) fn take_filled_chunks(
@@ -26,7 +26,7 @@ pub(super) fn take_filled_chunks(
         if !volume.heart().has_filled() {
             continue;
         }
-        volume.heart_mut().take_filled(LEAST, until, |chunk: &Filled| {
+        volume.heart_mut().take_filled(MIN_CHUNKS, until, |chunk: &Filled| {
             stats.fill_time += chunk.time;
             stats.filled += u64::from(chunk.filled);
             stats.filled_empty += u64::from(chunk.filled && !chunk.may_have_surface());

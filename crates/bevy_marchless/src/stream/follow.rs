@@ -11,10 +11,10 @@ use bevy_transform::components::GlobalTransform;
 use bevy_transform::helper::TransformHelper;
 
 use super::TerrainViewer;
-use super::view::Look;
+use super::view::ViewFinder;
 use crate::budget::{FrameBudget, Share};
-use crate::cover::{Range, View};
-use crate::place::{Place, in_double_precision};
+use crate::cover::{LoadRegion, View};
+use crate::placement::{Placement, in_double_precision};
 use crate::stats::TerrainStats;
 use crate::terrain::{Terrain, TerrainVolume};
 
@@ -23,18 +23,18 @@ const PATIENCE: u32 = 120;
 
 /// What is known of the viewers of a terrain.
 #[derive(Component, Default)]
-pub(super) struct Followed {
+pub(super) struct TerrainViews {
     /// The latest good view of each viewer, and the settings it was made from.
     views: EntityHashMap<(TerrainViewer, View)>,
     /// What the views depend on besides the viewers.
-    at: Option<At>,
+    at: Option<TerrainState>,
     /// The latest run in which the terrain was looked at.
     run: u64,
     /// How many updates it has waited for the first viewer; stays at [`PATIENCE`], also once there has been one.
     waited: u32,
 }
 
-impl Followed {
+impl TerrainViews {
     /// Notes whether there are viewers. True once: when a terrain that loads nothing without any has waited too long.
     fn has_waited_too_long(&mut self, there_are_viewers: bool, settings: &Terrain) -> bool {
         if there_are_viewers {
@@ -50,7 +50,7 @@ impl Followed {
 
 /// Where a terrain is and what it is like: its generation, and how often its settings have changed.
 #[derive(Clone, Copy, PartialEq)]
-struct At {
+struct TerrainState {
     to_world: DAffine3,
     generation: u64,
     changes: u64,
@@ -61,14 +61,14 @@ struct At {
 pub(super) struct Viewers {
     /// Counts the runs of the system.
     run: u64,
-    seen: EntityHashMap<Seen>,
+    seen: EntityHashMap<ViewerState>,
     /// Those that have changed since the update before, and those that are gone.
     changed: Vec<Entity>,
     gone: Vec<Entity>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-struct Seen {
+struct ViewerState {
     settings: TerrainViewer,
     /// Where it is in this very update.
     now: Option<GlobalTransform>,
@@ -84,7 +84,7 @@ impl Viewers {
         for (viewer, settings, propagated) in viewers {
             let now = transforms.compute_global_transform(viewer).ok();
             let propagated = (!propagated.is_added()).then_some(*propagated);
-            let seen = Seen { settings: *settings, now, propagated };
+            let seen = ViewerState { settings: *settings, now, propagated };
             if self.seen.insert(viewer, seen) != Some(seen) {
                 self.changed.push(viewer);
             }
@@ -101,7 +101,7 @@ impl Viewers {
 ///
 /// What has not changed since the update before is not looked at again.
 pub(super) fn follow_viewers(
-    mut terrains: Query<(Entity, &mut TerrainVolume, &mut Followed, Place)>,
+    mut terrains: Query<(Entity, &mut TerrainVolume, &mut TerrainViews, Placement)>,
     viewers: Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>,
     transforms: TransformHelper,
     mut seen: Local<Viewers>,
@@ -135,7 +135,7 @@ pub(super) fn follow_viewers(
             transforms.compute_global_transform(terrain).ok().map(|transform| in_double_precision(&transform))
         };
         let (generation, changes) = (volume.heart().samples().generation(), volume.changes());
-        let at = to_world.map(|to_world| At { to_world, generation, changes });
+        let at = to_world.map(|to_world| TerrainState { to_world, generation, changes });
         // While it was disabled, viewers may have moved.
         let was_away = core::mem::replace(&mut followed.run, seen.run) + 1 != seen.run;
         let all = was_away || at.is_none() || followed.at != at;
@@ -170,7 +170,7 @@ struct ViewOf<'a> {
 
 impl ViewOf<'_> {
     /// Tells a terrain what the viewers see that have changed, or all of them.
-    fn follow(&mut self, volume: &mut TerrainVolume, followed: &mut Followed, all: bool) {
+    fn follow(&mut self, volume: &mut TerrainVolume, followed: &mut TerrainViews, all: bool) {
         for viewer in self.seen.gone.iter().filter(|viewer| followed.views.remove(*viewer).is_some()) {
             volume.heart_mut().set_view(Some(*viewer), None);
         }
@@ -201,7 +201,7 @@ impl ViewOf<'_> {
     fn follow_kept(&self, volume: &mut TerrainVolume) {
         let Some(settings) = volume.settings() else { return };
         let (kept, extent) = (settings.kept_region(), settings.chunk_region());
-        let view = (!kept.is_empty()).then(|| View::new(Range::of_box(kept, extent), 0.0, None, [0.0; 3]));
+        let view = (!kept.is_empty()).then(|| View::new(LoadRegion::of_box(kept, extent), 0.0, None, [0.0; 3]));
         volume.heart_mut().set_view(None, view);
     }
 
@@ -210,12 +210,12 @@ impl ViewOf<'_> {
         &mut self,
         volume: &TerrainVolume,
         viewer: Entity,
-        seen: &Seen,
+        seen: &ViewerState,
         known: Option<(TerrainViewer, View)>,
     ) -> Option<(TerrainViewer, View)> {
         let settings = volume.settings()?;
         let to_terrain = self.to_world.map(|to_world| to_world.inverse());
-        let mut look = Look { terrain: settings, to_terrain, reported: self.reported };
+        let mut look = ViewFinder { terrain: settings, to_terrain, reported: self.reported };
         let place = if self.is_floating { seen.propagated } else { seen.now };
         let view = place.and_then(|place| look.at(self.terrain, viewer, &seen.settings, &place, known));
         let as_before = || known.map(|(before, view)| (before, view.with_extent(settings.chunk_region())));

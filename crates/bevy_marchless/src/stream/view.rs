@@ -1,4 +1,4 @@
-//! [`Look`]: what a viewer sees of a terrain.
+//! [`ViewFinder`]: what a viewer sees of a terrain.
 
 use bevy_ecs::prelude::*;
 use bevy_math::{DAffine3, Vec3};
@@ -6,7 +6,7 @@ use bevy_platform::collections::HashSet;
 use bevy_transform::components::GlobalTransform;
 
 use super::TerrainViewer;
-use crate::cover::{Range, View};
+use crate::cover::{LoadRegion, View};
 use crate::terrain::Terrain;
 
 /// Viewers' positions are rounded to this part of a chunk, so that small steps change nothing.
@@ -15,7 +15,7 @@ const STEP: f64 = 1.0 / 8.0;
 const FARTHEST: f64 = 1e9;
 
 /// Finding the ranges around one terrain's viewers.
-pub(super) struct Look<'a> {
+pub(super) struct ViewFinder<'a> {
     pub(super) terrain: &'a Terrain,
     /// From world space to the terrain's own.
     pub(super) to_terrain: Option<DAffine3>,
@@ -23,7 +23,7 @@ pub(super) struct Look<'a> {
     pub(super) reported: &'a mut HashSet<(Entity, Entity)>,
 }
 
-impl Look<'_> {
+impl ViewFinder<'_> {
     /// What a viewer sees; `None` where that cannot be said.
     pub(super) fn at(
         &mut self,
@@ -74,7 +74,7 @@ impl Look<'_> {
         {
             return Some(viewed.facing(forward));
         }
-        let whole = Range::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
+        let whole = LoadRegion::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
         let range = limited(whole);
         if range == whole {
             self.reported.remove(&(terrain, viewer));
@@ -90,7 +90,7 @@ impl Look<'_> {
         let margin = limited_margin(&range, margin);
         // Where all that may be loaded lies within, none are dropped.
         let drops = samples < range.longest() + margin + 2.0;
-        let samples = drops.then(|| Range::ellipsoid(middle, [samples + STEP; 3], extent));
+        let samples = drops.then(|| LoadRegion::ellipsoid(middle, [samples + STEP; 3], extent));
         Some(View::new(range, margin, samples, forward))
     }
 
@@ -102,7 +102,7 @@ impl Look<'_> {
 }
 
 /// The range, made smaller until it has no more chunks than may be loaded.
-fn limited(mut range: Range) -> Range {
+fn limited(mut range: LoadRegion) -> LoadRegion {
     // First by the box around it: rows of a huge range would take too long to count.
     while range.box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
         range = range.shrunk(0.9);
@@ -114,7 +114,7 @@ fn limited(mut range: Range) -> Range {
 }
 
 /// The margin, made smaller until the range with it has no more than a few times the chunks that may be loaded.
-fn limited_margin(range: &Range, margin: f64) -> f64 {
+fn limited_margin(range: &LoadRegion, margin: f64) -> f64 {
     let mut margin = margin.min(FARTHEST);
     while margin > 0.1 && range.widened(margin).box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
         margin *= 0.9;

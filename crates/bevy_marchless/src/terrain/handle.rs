@@ -41,6 +41,7 @@ impl SourceHandle {
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
+    /// use bevy_marchless::terrain::{SourceHandle, TerrainSources};
     /// # use bevy_ecs::prelude::*;
     ///
     /// fn setup(mut commands: Commands, mut sources: ResMut<TerrainSources>) {
@@ -139,7 +140,7 @@ mod written {
     /// A source as data.
     #[derive(Serialize, Deserialize)]
     #[serde(rename = "Source")]
-    enum Written {
+    enum SerializedSource {
         Air,
         Named(String),
         #[cfg(feature = "noise")]
@@ -151,7 +152,7 @@ mod written {
         Sdf(Sdf),
     }
 
-    impl Written {
+    impl SerializedSource {
         /// `None` where the source is no data.
         fn of(handle: &SourceHandle) -> Option<Self> {
             if let Some(name) = handle.name() {
@@ -189,7 +190,7 @@ mod written {
 
     impl Serialize for SourceHandle {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            let written = Written::of(self).ok_or_else(|| {
+            let written = SerializedSource::of(self).ok_or_else(|| {
                 S::Error::custom(
                     "a terrain's source can be written where it has settings or goes by a name; give this one a name \
                      (`TerrainSources::insert` and `SourceHandle::named`)",
@@ -201,7 +202,7 @@ mod written {
 
     impl<'de> Deserialize<'de> for SourceHandle {
         fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            Written::deserialize(deserializer)?.handle().map_err(D::Error::custom)
+            SerializedSource::deserialize(deserializer)?.handle().map_err(D::Error::custom)
         }
     }
 }

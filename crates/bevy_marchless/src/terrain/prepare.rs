@@ -76,7 +76,7 @@ fn follow_settings(volume: &mut TerrainVolume) {
         heart.resize(extent);
     }
     if heart.mesh_settings().normals != normals || **heart.colors() != colors {
-        heart.set_look(normals, Arc::new(colors));
+        heart.set_appearance(normals, Arc::new(colors));
     }
     heart.set_isovalue(isovalue);
 }

@@ -110,7 +110,7 @@ impl TerrainVolume {
         self.is_loading
     }
 
-    #[cfg(feature = "world_files")]
+    #[cfg(feature = "terrain_files")]
     pub(crate) const fn set_loading(&mut self, is_loading: bool) {
         self.is_loading = is_loading;
     }

@@ -4,12 +4,12 @@ use core::mem;
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy_platform::collections::HashMap;
-use marchless::{Chunk, Edit, Region, Stamp};
+use marchless::{Edit, GridChunk, QuantisedStamp, Region};
 
 use super::Heart;
 use super::groups::Pending;
 use crate::chunk::ChunkKey;
-use crate::stats::Since;
+use crate::stats::RequestTime;
 
 /// What the stamps of one update have changed of a terrain. Those whose chunks overlap belong together; others stay apart,
 /// so that each is shown and reported by itself.
@@ -19,7 +19,7 @@ pub(crate) struct Edits {
     /// Which region a chunk with changed samples, or beside such a chunk, belongs to.
     owners: HashMap<[i32; 3], usize>,
     /// The chunks with changed samples, as they were.
-    before: BTreeMap<[i32; 3], Chunk<i16>>,
+    before: BTreeMap<[i32; 3], GridChunk<i16>>,
 }
 
 /// What some stamps have changed together.
@@ -29,7 +29,7 @@ struct EditedRegion {
     chunks: Vec<[i32; 3]>,
     /// Chunks whose meshes read changed samples.
     affected: BTreeSet<[i32; 3]>,
-    since: Since,
+    since: RequestTime,
 }
 
 impl Edits {
@@ -69,20 +69,20 @@ impl EditedRegion {
         self.edit.merge(&other.edit);
         self.chunks.extend(other.chunks);
         self.affected.extend(other.affected);
-        self.since = Since::earlier(Some(self.since), Some(other.since)).unwrap_or(self.since);
+        self.since = RequestTime::earlier(Some(self.since), Some(other.since)).unwrap_or(self.since);
     }
 }
 
 impl Heart {
     /// Applies a stamp that was read at `since`.
-    pub(crate) fn stamp(&mut self, stamp: Stamp, since: Since, edits: &mut Edits) {
+    pub(crate) fn stamp(&mut self, stamp: QuantisedStamp, since: RequestTime, edits: &mut Edits) {
         let changed = self.samples.stamp(stamp, &mut edits.before);
         changed.crowded.into_iter().for_each(|position| self.crowded.push(ChunkKey::finest(position)));
         for position in &changed.chunks {
             self.table.samples_changed(ChunkKey::finest(*position));
         }
         if !changed.edit.is_empty() {
-            let super::samples::Changed { edit, chunks, affected, .. } = changed;
+            let super::samples::StampChanges { edit, chunks, affected, .. } = changed;
             edits.add(EditedRegion { edit, chunks, affected, since });
         }
     }
@@ -96,12 +96,12 @@ impl Heart {
         for EditedRegion { edit, chunks, affected, since } in regions.into_iter().flatten() {
             let before: BTreeMap<_, _> =
                 chunks.iter().filter_map(|chunk| Some((*chunk, before.get(chunk)?.clone()))).collect();
-            let redrawn = self.samples.newest().chunks_redrawn(&before, edit.region, &settings);
-            let look_the_same =
+            let redrawn = self.samples.newest().chunks_with_mesh_changes(&before, edit.region, &settings);
+            let unchanged_meshes =
                 redrawn.map(|redrawn| affected.difference(&redrawn).copied().map(ChunkKey::finest).collect());
             self.changed(Pending {
                 chunks: affected.into_iter().map(ChunkKey::finest).collect(),
-                look_the_same: look_the_same.unwrap_or_default(),
+                unchanged_meshes: unchanged_meshes.unwrap_or_default(),
                 since: Some(since),
             });
             reports.push(edit);

@@ -5,11 +5,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use bevy_platform::time::Instant;
-use marchless::{BOUND_BOX_CHUNKS, Chunk, Source};
+use marchless::{BOUND_BOX_CHUNKS, GridChunk, Source};
 
 use super::groups::Pending;
 use super::samples::{Replay, Replayed};
-use super::{Heart, Recipe, Signs};
+use super::{Heart, KnownSigns, SamplingSettings};
 use crate::chunk::ChunkKey;
 use crate::jobs::{Ticket, new_number};
 use crate::stats::TerrainStats;
@@ -36,8 +36,8 @@ pub(crate) struct Filled {
     job: u64,
     generation: u64,
     pub(crate) position: [i32; 3],
-    chunk: Chunk<i16>,
-    signs: Signs,
+    chunk: GridChunk<i16>,
+    signs: KnownSigns,
     replayed: Replayed,
     /// Whether the source filled it, instead of being certain of it.
     pub(crate) filled: bool,
@@ -59,16 +59,16 @@ impl FillJob {
         let start = Instant::now();
         let Self { job, generation, position, source, cells, spacing, isovalue, replay, .. } = self;
         let (of_box, sample) = (bound_box(source.as_ref(), position, cells, spacing), || {
-            Chunk::from_uncertain_source(source.as_ref(), position, cells, spacing)
+            GridChunk::from_uncertain_source(source.as_ref(), position, cells, spacing)
         });
         let sampled = match bound_chunk(source.as_ref(), of_box, position, cells, spacing) {
             Some(chunk) => Ok((chunk, false)),
             None => catch_unwind(AssertUnwindSafe(sample)),
         };
         let panicked = sampled.is_err();
-        let (chunk, filled) = sampled.unwrap_or((Chunk::AIR, false));
+        let (chunk, filled) = sampled.unwrap_or((GridChunk::AIR, false));
         let (chunk, replayed) = replay.run(chunk);
-        let signs = if panicked { Signs::UNKNOWN } else { Signs::of(&chunk, isovalue) };
+        let signs = if panicked { KnownSigns::UNKNOWN } else { KnownSigns::of(&chunk, isovalue) };
         let time = start.elapsed();
         Filled { job, generation, position, chunk, signs, replayed, filled, panicked, time }
     }
@@ -152,7 +152,7 @@ impl Heart {
             && let Some(chunk) = self.bound(key.position)
         {
             stats.bounded += 1;
-            let signs = Signs::of(&chunk, self.isovalue);
+            let signs = KnownSigns::of(&chunk, self.isovalue);
             self.take_in(key, chunk, signs, None);
         } else {
             self.table.queue(key);
@@ -161,7 +161,7 @@ impl Heart {
     }
 
     /// Takes in the samples of a loaded chunk, and the stamps that came before them.
-    fn take_in(&mut self, key: ChunkKey, chunk: Chunk<i16>, signs: Signs, replayed: Option<Replayed>) {
+    fn take_in(&mut self, key: ChunkKey, chunk: GridChunk<i16>, signs: KnownSigns, replayed: Option<Replayed>) {
         // Whoever was to sample it for its stamps alone comes too late.
         if self.remote.remove(&key.position).is_some() {
             self.sampling -= 1;
@@ -172,7 +172,7 @@ impl Heart {
         let at_border = self.samples.newest().bounds().is_some_and(|bounds| {
             (0..3).any(|axis| [bounds.min[axis], bounds.max[axis] - 1].contains(&key.position[axis]))
         });
-        let signs = if at_border || !affected.is_empty() { Signs::UNKNOWN } else { signs };
+        let signs = if at_border || !affected.is_empty() { KnownSigns::UNKNOWN } else { signs };
         self.table.samples_arrived(key, Some(signs));
         self.filled_around(key);
         // What has not been drawn is meshed once all around it is filled.
@@ -192,7 +192,7 @@ impl Heart {
         }
     }
 
-    fn fill_job(&self, recipe: &Recipe, position: [i32; 3], urgency: u32) -> FillJob {
+    fn fill_job(&self, recipe: &SamplingSettings, position: [i32; 3], urgency: u32) -> FillJob {
         FillJob {
             job: new_number(),
             generation: self.samples.generation(),
@@ -207,32 +207,32 @@ impl Heart {
     }
 
     /// What the source is certain of without sampling.
-    fn bound(&mut self, position: [i32; 3]) -> Option<Chunk<i16>> {
-        let Recipe { source, cells, spacing, .. } = self.recipe.as_ref()?;
+    fn bound(&mut self, position: [i32; 3]) -> Option<GridChunk<i16>> {
+        let SamplingSettings { source, cells, spacing, .. } = self.recipe.as_ref()?;
         if self.bounds.len() > MOST_BOXES {
             self.bounds.clear();
         }
         let of_box = || bound_box(source.as_ref(), position, *cells, *spacing);
-        let of_box = self.bounds.entry(Chunk::<i16>::bound_box(position)).or_insert_with(of_box).clone();
+        let of_box = self.bounds.entry(GridChunk::<i16>::bound_box(position)).or_insert_with(of_box).clone();
         bound_chunk(source.as_ref(), of_box, position, *cells, *spacing)
     }
 }
 
 /// What a source is certain of for the box of chunks around one. A source that panics is certain of nothing.
-fn bound_box(source: &dyn Source, position: [i32; 3], cells: u32, spacing: f64) -> Option<Chunk<i16>> {
-    let lowest = Chunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
-    let of_box = || Chunk::box_without_sampling(source, lowest, BOUND_BOX_CHUNKS as u32, cells, spacing);
+fn bound_box(source: &dyn Source, position: [i32; 3], cells: u32, spacing: f64) -> Option<GridChunk<i16>> {
+    let lowest = GridChunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
+    let of_box = || GridChunk::box_without_sampling(source, lowest, BOUND_BOX_CHUNKS as u32, cells, spacing);
     catch_unwind(AssertUnwindSafe(of_box)).ok().flatten()
 }
 
 /// What a source is certain of for a chunk, given what it is for the box around it.
 fn bound_chunk(
     source: &dyn Source,
-    of_box: Option<Chunk<i16>>,
+    of_box: Option<GridChunk<i16>>,
     position: [i32; 3],
     cells: u32,
     spacing: f64,
-) -> Option<Chunk<i16>> {
-    let of_chunk = || Chunk::without_sampling_in(of_box, source, position, cells, spacing);
+) -> Option<GridChunk<i16>> {
+    let of_chunk = || GridChunk::without_sampling_in(of_box, source, position, cells, spacing);
     catch_unwind(AssertUnwindSafe(of_chunk)).ok().flatten()
 }

@@ -1,18 +1,18 @@
 //! Chunks come and go: each becomes what the cover asks of it.
 
 use bevy_platform::time::Instant;
-use marchless::{Chunk, Region};
+use marchless::{GridChunk, Region};
 
 use super::Heart;
 use super::groups::Pending;
 use super::table::Unloaded;
 use crate::budget::ENTITY_TIME;
 use crate::chunk::ChunkKey;
-use crate::cover::{ViewId, Wanted};
+use crate::cover::{Residency, ViewId};
 use crate::stats::TerrainStats;
 
 /// Each update at least this many chunks come, and as many go.
-const LEAST: usize = 4;
+const MIN_CHUNKS: usize = 4;
 /// A view is revealed further while fewer of its chunks wait.
 const FEW: usize = 256;
 
@@ -36,17 +36,17 @@ impl Heart {
         let until_gone = now + until.saturating_duration_since(now) / share;
         let despawning = |heart: &Self| heart.table.released_len() as u32 * ENTITY_TIME;
         let mut done = 0;
-        while (done < LEAST || Instant::now() + despawning(self) < until_gone)
+        while (done < MIN_CHUNKS || Instant::now() + despawning(self) < until_gone)
             && let Some(key) = self.leaving.pop()
         {
-            self.settle(key, stats);
+            self.follow_residency(key, stats);
             done += 1;
         }
         let mut done = 0;
-        while (done < LEAST || !is_crowded && Instant::now() + despawning(self) < until)
+        while (done < MIN_CHUNKS || !is_crowded && Instant::now() + despawning(self) < until)
             && let Some(key) = self.next_arriving(until)
         {
-            self.settle(key, stats);
+            self.follow_residency(key, stats);
             done += 1;
         }
         // That goes through all chunks: not while viewers move.
@@ -55,7 +55,7 @@ impl Heart {
         }
         if self.is_filled() && self.transition.is_none() {
             let mut done = 0;
-            while (done < LEAST || Instant::now() < until)
+            while (done < MIN_CHUNKS || Instant::now() < until)
                 && let Some(key) = self.droppable.pop()
             {
                 self.drop_samples(key);
@@ -146,8 +146,9 @@ impl Heart {
     fn next_arriving(&mut self, until: Instant) -> Option<ChunkKey> {
         loop {
             let Self { arriving, cover, table, .. } = self;
-            let waits =
-                |key: &ChunkKey| table.contains(*key) || cover.wanted(key.position, Wanted::Samples) > Wanted::Gone;
+            let waits = |key: &ChunkKey| {
+                table.contains(*key) || cover.wanted(key.position, Residency::Samples) > Residency::Gone
+            };
             let next = arriving.pop(cover, waits);
             if next.is_some() || Instant::now() >= until || !self.reveal(until) {
                 return next;
@@ -156,17 +157,17 @@ impl Heart {
     }
 
     /// Makes of a chunk what the cover asks of it.
-    fn settle(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
+    fn follow_residency(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         let Some(extent) = self.recipe.as_ref().map(|recipe| recipe.extent) else { return };
         let is_there = extent.contains(key.position);
-        let wanted = if is_there { self.cover.wanted(key.position, self.table.kept(key)) } else { Wanted::Gone };
+        let wanted = if is_there { self.cover.wanted(key.position, self.table.kept(key)) } else { Residency::Gone };
         match (self.table.contains(key), wanted) {
-            (false, Wanted::Gone) => return,
+            (false, Residency::Gone) => return,
             (false, _) => self.load(key, wanted, stats),
-            (true, Wanted::Gone) => return self.unload(key, stats),
-            (true, Wanted::Samples) => self.hide(key),
-            (true, Wanted::Mesh) if self.table.is_leaf(key) => self.load_lost_neighbours(key, extent, stats),
-            (true, Wanted::Mesh) => self.table.promote(key),
+            (true, Residency::Gone) => return self.unload(key, stats),
+            (true, Residency::Samples) => self.hide(key),
+            (true, Residency::Mesh) if self.table.is_leaf(key) => self.load_lost_neighbours(key, extent, stats),
+            (true, Residency::Mesh) => self.table.promote(key),
         }
         if self.cover.drops_samples() {
             self.revive_or_drop(key);
@@ -176,7 +177,7 @@ impl Heart {
         }
     }
 
-    fn load(&mut self, key: ChunkKey, wanted: Wanted, stats: &mut TerrainStats) {
+    fn load(&mut self, key: ChunkKey, wanted: Residency, stats: &mut TerrainStats) {
         self.table.load(key, wanted);
         stats.loaded += 1;
     }
@@ -190,8 +191,8 @@ impl Heart {
             return;
         }
         for near in key.around().filter(|near| extent.contains(near.position)) {
-            let wanted = self.cover.wanted(near.position, Wanted::Samples);
-            if wanted > Wanted::Gone && !self.table.contains(near) {
+            let wanted = self.cover.wanted(near.position, Residency::Samples);
+            if wanted > Residency::Gone && !self.table.contains(near) {
                 self.load(near, wanted, stats);
                 self.fill(near, stats);
             }
@@ -249,8 +250,8 @@ impl Heart {
             self.table.is_current(near) && !self.groups.is_claimed(near) && !self.groups.is_pending(near)
         };
         self.table.is_filled(key)
-            && matches!(self.samples.newest().chunk(key.position), Some(Chunk::Samples(_)))
-            && !self.samples.is_held(key.position)
+            && matches!(self.samples.newest().chunk(key.position), Some(GridChunk::Samples(_)))
+            && !self.samples.touches_boundary(key.position)
             && key.around().filter(|near| recipe.extent.contains(near.position)).all(is_done)
     }
 

@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use bevy_mesh::Mesh;
 use bevy_platform::collections::HashMap;
-use marchless::{Chunk, MeshBuffer};
+use marchless::{GridChunk, MeshBuffer};
 
 use crate::chunk::ChunkKey;
 use crate::jobs::{Ticket, new_number};
-use crate::stats::Since;
+use crate::stats::RequestTime;
 
 /// The changed chunks that wait to be meshed, and those that are being meshed.
 ///
@@ -37,9 +37,9 @@ pub(crate) struct Groups {
 pub(crate) struct Pending {
     pub(crate) chunks: BTreeSet<ChunkKey>,
     /// Those of them whose meshes, where they have been drawn, stay as they are.
-    pub(crate) look_the_same: BTreeSet<ChunkKey>,
+    pub(crate) unchanged_meshes: BTreeSet<ChunkKey>,
     /// When the first of the edits was asked for; `None` where none was.
-    pub(crate) since: Option<Since>,
+    pub(crate) since: Option<RequestTime>,
 }
 
 /// Chunks that are being meshed from one snapshot, to be shown in one update.
@@ -47,14 +47,14 @@ pub(crate) struct Group {
     /// The chunks that it claims: its members, and those that cannot be meshed yet.
     pub(super) chunks: BTreeSet<ChunkKey>,
     /// The samples of its members and of the chunks around them, where they are not shown yet.
-    pub(super) snapshot: BTreeMap<[i32; 3], Chunk<i16>>,
-    /// The number of the look that its meshes have.
-    pub(super) look: u64,
-    pub(super) since: Option<Since>,
+    pub(super) snapshot: BTreeMap<[i32; 3], GridChunk<i16>>,
+    /// The number of the appearance that its meshes have.
+    pub(super) appearance: u64,
+    pub(super) since: Option<RequestTime>,
     pub(super) purpose: Purpose,
     /// How many chunks will have been meshed when it is complete.
     pub(super) members: usize,
-    pub(super) meshed: Vec<Meshed>,
+    pub(super) meshed: Vec<ChunkMesh>,
     /// The rights to its jobs' results.
     pub(super) tickets: Vec<Ticket>,
 }
@@ -77,7 +77,7 @@ impl Purpose {
 }
 
 /// A chunk's new mesh.
-pub(crate) struct Meshed {
+pub(crate) struct ChunkMesh {
     pub(crate) position: [i32; 3],
     pub(crate) geometry: Arc<MeshBuffer>,
     /// The same as an asset, where assets are wanted and there is something to draw.
@@ -86,7 +86,7 @@ pub(crate) struct Meshed {
     pub(crate) time: Duration,
 }
 
-impl Meshed {
+impl ChunkMesh {
     /// Nothing to draw.
     pub(crate) fn empty(position: [i32; 3]) -> Self {
         Self { position, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
@@ -223,8 +223,8 @@ impl Groups {
     pub(super) fn take_all(&mut self) -> Vec<Pending> {
         let Self { pending, running, .. } = mem::take(self);
         let of_group = |group: Group| {
-            let look_the_same = BTreeSet::new();
-            Pending { chunks: group.chunks, look_the_same, since: group.since }
+            let unchanged_meshes = BTreeSet::new();
+            Pending { chunks: group.chunks, unchanged_meshes, since: group.since }
         };
         running.into_values().map(of_group).chain(pending.into_values()).collect()
     }
@@ -247,7 +247,7 @@ impl Groups {
 
 impl Group {
     /// Takes in a mesh of one of its members.
-    pub(crate) fn push(&mut self, meshed: Meshed) {
+    pub(crate) fn push(&mut self, meshed: ChunkMesh) {
         self.meshed.push(meshed);
     }
 
@@ -259,11 +259,11 @@ impl Group {
 impl Pending {
     /// Takes in all of another set. What looks the same after one change may not after the other.
     fn merge(&mut self, other: &mut Self) {
-        self.look_the_same.retain(|key| !other.chunks.contains(key) || other.look_the_same.contains(key));
-        other.look_the_same.retain(|key| !self.chunks.contains(key) || self.look_the_same.contains(key));
-        self.look_the_same.append(&mut other.look_the_same);
+        self.unchanged_meshes.retain(|key| !other.chunks.contains(key) || other.unchanged_meshes.contains(key));
+        other.unchanged_meshes.retain(|key| !self.chunks.contains(key) || self.unchanged_meshes.contains(key));
+        self.unchanged_meshes.append(&mut other.unchanged_meshes);
         self.chunks.append(&mut other.chunks);
-        self.since = Since::earlier(self.since, other.since);
+        self.since = RequestTime::earlier(self.since, other.since);
     }
 }
 
@@ -276,14 +276,14 @@ mod tests {
     }
 
     fn pending(xs: &[i32], same: &[i32]) -> Pending {
-        Pending { chunks: set(xs), look_the_same: set(same), since: None }
+        Pending { chunks: set(xs), unchanged_meshes: set(same), since: None }
     }
 
     fn group(xs: &[i32], purpose: Purpose) -> Group {
         Group {
             chunks: set(xs),
             snapshot: BTreeMap::new(),
-            look: 0,
+            appearance: 0,
             since: None,
             purpose,
             members: 1,
@@ -330,7 +330,7 @@ mod tests {
         groups.check();
         let only = groups.next_free().expect("one set");
         assert_eq!(only.chunks, set(&[0, 1, 2, 4, 5, 6]));
-        assert_eq!(only.look_the_same, set(&[0, 4, 6]), "1 changes with the later set, 5 with the earlier");
+        assert_eq!(only.unchanged_meshes, set(&[0, 4, 6]), "1 changes with the later set, 5 with the earlier");
         groups.add(pending(&[], &[]));
         assert!(groups.next_free().is_none() && groups.is_empty());
     }

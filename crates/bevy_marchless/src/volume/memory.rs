@@ -1,9 +1,9 @@
 //! How much memory samples take.
 
-use marchless::Chunk;
+use marchless::GridChunk;
 
 use super::Heart;
-use super::samples::same_samples;
+use super::samples::shares_samples;
 
 impl Heart {
     /// How much memory the plugin's notes about chunks take, in bytes.
@@ -27,9 +27,9 @@ impl Heart {
             let [newest, shown] =
                 [&mut newest, &mut shown].map(|chunks| chunks.next_if(|(position, _)| *position == next));
             let entries = [newest, shown].into_iter().flatten();
-            bytes += entries.map(|_| size_of::<([i32; 3], Chunk<i16>)>()).sum::<usize>();
+            bytes += entries.map(|_| size_of::<([i32; 3], GridChunk<i16>)>()).sum::<usize>();
             bytes += match (newest, shown) {
-                (Some((_, newest)), Some((_, shown))) if !same_samples(newest, shown) => {
+                (Some((_, newest)), Some((_, shown))) if !shares_samples(newest, shown) => {
                     bytes_of(newest) + bytes_of(shown)
                 }
                 (Some((_, chunk)), _) | (None, Some((_, chunk))) => bytes_of(chunk),
@@ -41,9 +41,9 @@ impl Heart {
 }
 
 /// How much memory a chunk's samples take, in bytes.
-fn bytes_of(chunk: &Chunk<i16>) -> usize {
+fn bytes_of(chunk: &GridChunk<i16>) -> usize {
     match chunk {
-        Chunk::Uniform(_) => 0,
-        Chunk::Samples(samples) => 2 * samples.weights.capacity() + samples.materials.capacity(),
+        GridChunk::Uniform(_) => 0,
+        GridChunk::Samples(samples) => 2 * samples.weights.capacity() + samples.materials.capacity(),
     }
 }

@@ -4,18 +4,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use bevy_ecs::entity::Entity;
 use bevy_platform::time::Instant;
-use marchless::{Chunk, Grid};
+use marchless::{Grid, GridChunk};
 
-use super::groups::{Group, Meshed, Pending, Purpose};
-use super::samples::same_samples;
-use super::table::{Drawn, Place};
+use super::groups::{ChunkMesh, Group, Pending, Purpose};
+use super::samples::shares_samples;
+use super::table::{DrawnMesh, ShowTarget};
 use super::{Heart, Restyled};
 use crate::chunk::ChunkKey;
 use crate::jobs::Ticket;
-use crate::stats::Since;
+use crate::stats::RequestTime;
 
 /// A group that has not started, and those of its chunks that are to be meshed.
-pub(crate) struct Prepared {
+pub(crate) struct PreparedGroup {
     pub(crate) group: Group,
     pub(crate) to_mesh: Vec<[i32; 3]>,
 }
@@ -23,7 +23,7 @@ pub(crate) struct Prepared {
 /// What a job has meshed.
 pub(crate) enum MeshResult {
     /// A chunk of the group with this number.
-    OfGroup(u64, Meshed),
+    OfGroup(u64, ChunkMesh),
     /// A chunk at the isovalue to come, with the number of its look.
     Restyled(Restyled),
 }
@@ -31,10 +31,10 @@ pub(crate) enum MeshResult {
 /// A new mesh, and where to show it.
 pub(crate) struct Swap {
     pub(crate) key: ChunkKey,
-    pub(crate) place: Place,
-    pub(crate) meshed: Meshed,
-    /// The number of the look that it has.
-    pub(crate) look: u64,
+    pub(crate) place: ShowTarget,
+    pub(crate) meshed: ChunkMesh,
+    /// The number of the appearance that it has.
+    pub(crate) appearance: u64,
 }
 
 /// What is to be shown in one update.
@@ -42,7 +42,7 @@ pub(crate) struct Swap {
 pub(crate) struct Shown {
     pub(crate) swaps: Vec<Swap>,
     /// When the edits among it were asked for, where there are some.
-    pub(crate) since: Vec<Since>,
+    pub(crate) since: Vec<RequestTime>,
 }
 
 impl Heart {
@@ -84,7 +84,7 @@ impl Heart {
     }
 
     /// The next changed chunks on which nobody works.
-    pub(crate) fn next_changed(&mut self) -> Option<Prepared> {
+    pub(crate) fn next_changed(&mut self) -> Option<PreparedGroup> {
         while let Some(pending) = self.groups.next_free() {
             if let Some(prepared) = self.prepare(pending, Purpose::Edit) {
                 return Some(prepared);
@@ -95,7 +95,7 @@ impl Heart {
 
     /// The most urgent chunk that is to be drawn for the first time, or anew; `None` where none waits, or as many groups
     /// that give way are under way as `limit` says. The second number: how urgent it is.
-    pub(crate) fn next_first_mesh(&mut self, limit: usize) -> Option<(Prepared, u32)> {
+    pub(crate) fn next_first_mesh(&mut self, limit: usize) -> Option<(PreparedGroup, u32)> {
         while self.groups.yielding() < limit {
             let Self { to_mesh, cover, table, groups, .. } = self;
             let waits = |key: &ChunkKey| table.is_ready(*key) && !groups.is_pending(*key) && !groups.is_claimed(*key);
@@ -108,12 +108,12 @@ impl Heart {
         None
     }
 
-    pub(super) fn prepare_one(&mut self, key: ChunkKey, purpose: Purpose) -> Option<Prepared> {
+    pub(super) fn prepare_one(&mut self, key: ChunkKey, purpose: Purpose) -> Option<PreparedGroup> {
         self.prepare(Pending { chunks: BTreeSet::from([key]), ..Pending::default() }, purpose)
     }
 
     /// Finds what of changed chunks is to be meshed; `None` where that is nothing, or they have to wait for samples.
-    fn prepare(&mut self, pending: Pending, purpose: Purpose) -> Option<Prepared> {
+    fn prepare(&mut self, pending: Pending, purpose: Purpose) -> Option<PreparedGroup> {
         // What is drawn changes with the others: where samples around it are missing, all wait for them.
         let lacking: Vec<ChunkKey> = pending
             .chunks
@@ -131,11 +131,11 @@ impl Heart {
             }
             return None;
         }
-        let Pending { chunks, look_the_same, since } = pending;
+        let Pending { chunks, unchanged_meshes, since } = pending;
         let mut group = Group {
             chunks,
             snapshot: BTreeMap::new(),
-            look: self.look.number,
+            appearance: self.appearance.number,
             since,
             purpose,
             members: 0,
@@ -147,19 +147,19 @@ impl Heart {
             let samples = self.samples.newest().neighbourhood_view(key.position);
             let shown = self.samples.shown().neighbourhood_view(key.position);
             for (near, (chunk, shown)) in key.around().zip(samples.chunks().iter().zip(shown.chunks())) {
-                let Some(chunk) = chunk.filter(|chunk| !shown.is_some_and(|shown| same_samples(shown, chunk))) else {
+                let Some(chunk) = chunk.filter(|chunk| !shown.is_some_and(|shown| shares_samples(shown, chunk))) else {
                     continue;
                 };
                 if group.chunks.contains(&near) || !self.table.is_shown(near) {
                     group.snapshot.entry(near.position).or_insert_with(|| chunk.clone());
                 }
             }
-            if self.table.is_current(key) && look_the_same.contains(&key) {
+            if self.table.is_current(key) && unchanged_meshes.contains(&key) {
                 continue;
             }
             group.members += 1;
             if samples.is_uniform() {
-                group.meshed.push(Meshed::empty(key.position));
+                group.meshed.push(ChunkMesh::empty(key.position));
             } else {
                 to_mesh.push(key.position);
             }
@@ -167,13 +167,13 @@ impl Heart {
         if group.members == 0 && group.snapshot.is_empty() {
             return None;
         }
-        Some(Prepared { group, to_mesh })
+        Some(PreparedGroup { group, to_mesh })
     }
 
     /// Starts a group whose chunks are meshed in jobs. `start`: starts the job of the chunk at a position for the group with
     /// this number.
-    pub(crate) fn start(&mut self, prepared: Prepared, mut start: impl FnMut(&Self, u64, [i32; 3]) -> Ticket) {
-        let Prepared { group, to_mesh } = prepared;
+    pub(crate) fn start(&mut self, prepared: PreparedGroup, mut start: impl FnMut(&Self, u64, [i32; 3]) -> Ticket) {
+        let PreparedGroup { group, to_mesh } = prepared;
         let id = self.groups.start(group);
         let tickets: Vec<Ticket> = to_mesh.into_iter().map(|position| start(self, id, position)).collect();
         if let Some(group) = self.groups.get_mut(id) {
@@ -186,7 +186,7 @@ impl Heart {
     pub(crate) fn take_meshed(
         &mut self,
         mut may_take_more: impl FnMut() -> bool,
-        mut note: impl FnMut(&Meshed),
+        mut note: impl FnMut(&ChunkMesh),
     ) -> Option<Group> {
         self.meshed_later.extend(self.meshed.take());
         for _ in 0..self.meshed_later.len() {
@@ -214,9 +214,9 @@ impl Heart {
 
     /// Shows all chunks of a complete group.
     pub(crate) fn show(&mut self, group: Group) -> Shown {
-        let Group { chunks, snapshot, look, since, meshed, .. } = group;
-        let is_left = |meshed: &Meshed| chunks.contains(&ChunkKey::finest(meshed.position));
-        let swaps = meshed.into_iter().filter(is_left).map(|meshed| self.swap(meshed, look)).collect();
+        let Group { chunks, snapshot, appearance, since, meshed, .. } = group;
+        let is_left = |meshed: &ChunkMesh| chunks.contains(&ChunkKey::finest(meshed.position));
+        let swaps = meshed.into_iter().filter(is_left).map(|meshed| self.swap(meshed, appearance)).collect();
         for (position, chunk) in snapshot {
             let key = ChunkKey::finest(position);
             if self.table.contains(key) && (chunks.contains(&key) || !self.table.is_shown(key)) {
@@ -230,16 +230,16 @@ impl Heart {
     }
 
     /// A chunk's mesh is on this new entity.
-    pub(crate) fn spawned(&mut self, key: ChunkKey, drawn: Drawn) {
+    pub(crate) fn spawned(&mut self, key: ChunkKey, drawn: DrawnMesh) {
         self.table.spawned(key, drawn);
         self.shown(key);
     }
 
     /// Takes a new mesh, and tells where it is to be shown.
-    pub(super) fn swap(&mut self, meshed: Meshed, look: u64) -> Swap {
+    pub(super) fn swap(&mut self, meshed: ChunkMesh, appearance: u64) -> Swap {
         let key = ChunkKey::finest(meshed.position);
         self.has_shown = true;
-        Swap { key, place: self.table.meshed(key, &meshed.geometry, look), meshed, look }
+        Swap { key, place: self.table.meshed(key, &meshed.geometry, appearance), meshed, appearance }
     }
 
     /// What is shown of a chunk has changed.
@@ -248,7 +248,7 @@ impl Heart {
         self.table.look_again(key);
         self.may_drop_around(key);
         self.renew_in_transition(key);
-        if self.table.drawn(key).is_some_and(|drawn| drawn.look != self.look.number) {
+        if self.table.drawn(key).is_some_and(|drawn| drawn.appearance != self.appearance.number) {
             self.to_restyle.push(key);
         }
     }
@@ -265,5 +265,5 @@ impl Heart {
 
 /// Whether a chunk and all around it are certainly of one kind: that is asked without touching shared samples.
 pub(super) fn is_uniform_around(grid: &Grid<i16>, position: [i32; 3]) -> bool {
-    !matches!(grid.chunk(position), Some(Chunk::Samples(_))) && grid.neighbourhood_view(position).is_uniform()
+    !matches!(grid.chunk(position), Some(GridChunk::Samples(_))) && grid.neighbourhood_view(position).is_uniform()
 }

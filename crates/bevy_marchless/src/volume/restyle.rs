@@ -12,27 +12,27 @@ use std::sync::Arc;
 use bevy_platform::collections::HashSet;
 use marchless::{MeshBuffer, MeshSettings};
 
-use super::mesh::{Prepared, Shown, is_uniform_around};
-use super::{Colors, Group, Heart, Meshed, Purpose};
+use super::mesh::{PreparedGroup, Shown, is_uniform_around};
+use super::{ChunkMesh, Colors, Group, Heart, Purpose};
 use crate::chunk::ChunkKey;
 use crate::cover::UniqueQueue;
 use crate::jobs::{Ticket, new_number};
 
 /// How meshes look, apart from the isovalue.
-pub(super) struct Look {
+pub(super) struct Appearance {
     /// Tells meshes that look otherwise.
     pub(super) number: u64,
     pub(super) normals: bool,
     pub(super) colors: Colors,
 }
 
-impl Look {
+impl Appearance {
     pub(super) fn new(normals: bool, colors: Colors) -> Self {
         Self { number: new_number(), normals, colors }
     }
 }
 
-impl Default for Look {
+impl Default for Appearance {
     fn default() -> Self {
         Self { number: 0, normals: true, colors: Arc::new([[1.0; 4]; 256]) }
     }
@@ -46,7 +46,7 @@ pub(super) struct Transition {
     lacking: HashSet<ChunkKey>,
     /// Those that are being meshed, each with its job.
     running: HashMap<ChunkKey, (u64, Ticket)>,
-    done: HashMap<ChunkKey, (Meshed, u64)>,
+    done: HashMap<ChunkKey, (ChunkMesh, u64)>,
 }
 
 impl Transition {
@@ -58,22 +58,22 @@ impl Transition {
 /// A chunk meshed at the isovalue to come.
 pub(crate) struct Restyled {
     pub(crate) job: u64,
-    pub(crate) meshed: Meshed,
-    pub(crate) look: u64,
+    pub(crate) meshed: ChunkMesh,
+    pub(crate) appearance: u64,
 }
 
 /// A chunk that is to look otherwise.
 pub(crate) enum Restyle {
     /// It needs another mesh.
-    Mesh(Prepared),
+    Mesh(PreparedGroup),
     /// Its geometry in other colours.
     Recolor(ChunkKey, Group, Arc<MeshBuffer>),
 }
 
 impl Heart {
     /// Changes whether meshes have normals, and their colours.
-    pub(crate) fn set_look(&mut self, normals: bool, colors: Colors) {
-        self.look = Look::new(normals, colors);
+    pub(crate) fn set_appearance(&mut self, normals: bool, colors: Colors) {
+        self.appearance = Appearance::new(normals, colors);
         let Self { table, to_restyle, .. } = self;
         table.entities().for_each(|(key, _)| to_restyle.push(key));
     }
@@ -88,21 +88,23 @@ impl Heart {
     pub(crate) fn next_restyle(&mut self, limit: usize, assets: bool) -> Option<Restyle> {
         while self.groups.yielding() < limit {
             let key = self.to_restyle.pop()?;
-            let Some(drawn) = self.table.drawn(key).filter(|drawn| drawn.look != self.look.number) else { continue };
+            let Some(drawn) = self.table.drawn(key).filter(|drawn| drawn.appearance != self.appearance.number) else {
+                continue;
+            };
             if self.groups.is_pending(key) || self.groups.is_claimed(key) {
                 continue; // It is looked at again when it is shown.
             }
             let geometry = drawn.geometry.clone();
-            if geometry.is_empty() || geometry.normals.is_empty() != self.look.normals {
+            if geometry.is_empty() || geometry.normals.is_empty() != self.appearance.normals {
                 if geometry.is_empty() || !assets {
-                    self.table.set_look(key, self.look.number);
+                    self.table.set_appearance(key, self.appearance.number);
                     continue;
                 }
                 let chunks = [key].into();
                 let group = Group {
                     chunks,
                     snapshot: Default::default(),
-                    look: self.look.number,
+                    appearance: self.appearance.number,
                     since: None,
                     purpose: Purpose::Restyle,
                     members: 1,
@@ -201,16 +203,16 @@ impl Heart {
                 transition.lacking.insert(key);
                 self.look_at(key);
             } else if is_uniform_around(self.samples.newest(), key.position) {
-                transition.done.insert(key, (Meshed::empty(key.position), self.look.number));
+                transition.done.insert(key, (ChunkMesh::empty(key.position), self.appearance.number));
             } else {
                 return Some((key, new_number(), MeshSettings { isovalue: transition.isovalue, ..settings }));
             }
         }
     }
 
-    /// The number of the look that meshes get now.
-    pub(crate) const fn look(&self) -> u64 {
-        self.look.number
+    /// The number of the appearance that meshes get now.
+    pub(crate) const fn appearance(&self) -> u64 {
+        self.appearance.number
     }
 
     /// A chunk is being meshed for the isovalue to come.
@@ -222,13 +224,13 @@ impl Heart {
 
     /// A chunk has been meshed for the isovalue to come.
     pub(crate) fn take_restyled(&mut self, restyled: Restyled) {
-        let Restyled { job, meshed, look } = restyled;
+        let Restyled { job, meshed, appearance } = restyled;
         let key = ChunkKey::finest(meshed.position);
         if let Some(transition) = &mut self.transition
             && transition.running.get(&key).is_some_and(|(number, _)| *number == job)
         {
             transition.running.remove(&key);
-            transition.done.insert(key, (meshed, look));
+            transition.done.insert(key, (meshed, appearance));
         }
     }
 
@@ -240,10 +242,10 @@ impl Heart {
     }
 
     /// A chunk has been meshed at once for the isovalue to come.
-    pub(crate) fn meshed_in_transition(&mut self, meshed: Meshed) {
-        let look = self.look.number;
+    pub(crate) fn meshed_in_transition(&mut self, meshed: ChunkMesh) {
+        let appearance = self.appearance.number;
         if let Some(transition) = &mut self.transition {
-            transition.done.insert(ChunkKey::finest(meshed.position), (meshed, look));
+            transition.done.insert(ChunkKey::finest(meshed.position), (meshed, appearance));
         }
     }
 
@@ -255,11 +257,11 @@ impl Heart {
         self.isovalue = isovalue;
         let mut shown = Shown::default();
         let groups = self.groups.take_all();
-        for (_, (meshed, look)) in done {
+        for (_, (meshed, appearance)) in done {
             let key = ChunkKey::finest(meshed.position);
             self.samples.show_newest(key.position);
-            shown.swaps.push(self.swap(meshed, look));
-            if look != self.look.number {
+            shown.swaps.push(self.swap(meshed, appearance));
+            if appearance != self.appearance.number {
                 self.to_restyle.push(key);
             }
             self.may_drop_around(key);
@@ -269,7 +271,7 @@ impl Heart {
                 self.samples.show_newest(near.position);
             }
             self.table.look_again(*key);
-            if self.table.drawn(*key).is_some_and(|drawn| drawn.look != self.look.number) {
+            if self.table.drawn(*key).is_some_and(|drawn| drawn.appearance != self.appearance.number) {
                 self.to_restyle.push(*key);
             }
         }

@@ -1,36 +1,36 @@
-//! [`Samples`]: a terrain's samples, the newest and those shown, and what stamps have changed of them.
+//! [`SampleStore`]: a terrain's samples, the newest and those shown, and what stamps have changed of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use bevy_platform::collections::HashMap;
-use marchless::{Chunk, DEFAULT_CHUNK_CELLS, Edit, Grid, NeighbourhoodView, Region, SpareSamples, Stamp};
+use marchless::{DEFAULT_CHUNK_CELLS, Edit, Grid, GridChunk, NeighbourhoodView, QuantisedStamp, Region, SamplePool};
 
-use super::stamps::{Logged, StampLog};
+use super::stamps::{LoggedStamp, StampLog};
 use crate::jobs::new_number;
 
 /// The samples of one terrain. Undo, saving and replication need no other part.
 ///
 /// A chunk's samples are *resident* or not; those that are hold every stamp. Those that are not are had from the source, and
 /// the stamps that concern them applied again in order, by a [`Replay`].
-pub(crate) struct Samples {
+pub(crate) struct SampleStore {
     /// Resident chunks, with every stamp.
     newest: Grid<i16>,
     /// As drawn, with those that chunks not drawn yet will have beside drawn ones.
     shown: Grid<i16>,
     log: StampLog,
     /// Chunks that stamps have changed while they were resident.
-    edited: HashMap<[i32; 3], Edited>,
+    edited: HashMap<[i32; 3], KeptEdits>,
     /// How many of them are held.
     held: usize,
-    spare: SpareSamples,
+    pool: SamplePool,
     /// Tells chunks sampled for an earlier source; 0 before the first.
     generation: u64,
 }
 
 /// What is kept of a chunk's edits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Edited {
+enum KeptEdits {
     /// The stamps in the log: this many have changed it, and what those up to this number changed has been reported.
     Stamps { changes: u32, reported: u64 },
     /// Its samples, wherever viewers are.
@@ -38,12 +38,12 @@ enum Edited {
 }
 
 /// When more stamps than this have changed a chunk, its samples stay instead: they take less memory.
-pub(super) const MOST_STAMPS: u32 = 64;
+pub(super) const MAX_STAMPS: u32 = 64;
 
 /// The stamps that a chunk's samples lack that come from the source.
 pub(crate) struct Replay {
     position: [i32; 3],
-    stamps: Vec<Logged>,
+    stamps: Vec<LoggedStamp>,
     /// The number of the latest stamp of all.
     through: u64,
     reported: u64,
@@ -60,7 +60,7 @@ pub(crate) struct Replayed {
 }
 
 /// What one stamp has changed.
-pub(crate) struct Changed {
+pub(crate) struct StampChanges {
     pub(crate) edit: Edit,
     /// The chunks with changed samples.
     pub(crate) chunks: Vec<[i32; 3]>,
@@ -70,13 +70,13 @@ pub(crate) struct Changed {
     pub(crate) crowded: Vec<[i32; 3]>,
 }
 
-impl Default for Samples {
+impl Default for SampleStore {
     fn default() -> Self {
         Self::new(Grid::new(DEFAULT_CHUNK_CELLS).expect("the default is within the limits"), 0)
     }
 }
 
-impl Samples {
+impl SampleStore {
     fn new(grid: Grid<i16>, generation: u64) -> Self {
         Self {
             shown: grid.clone(),
@@ -84,7 +84,7 @@ impl Samples {
             log: StampLog::default(),
             edited: HashMap::default(),
             held: 0,
-            spare: SpareSamples::new(),
+            pool: SamplePool::new(),
             generation,
         }
     }
@@ -113,8 +113,8 @@ impl Samples {
     }
 
     /// Whether the samples stay wherever viewers are.
-    pub(super) fn is_held(&self, position: [i32; 3]) -> bool {
-        self.edited.get(&position) == Some(&Edited::Held)
+    pub(super) fn touches_boundary(&self, position: [i32; 3]) -> bool {
+        self.edited.get(&position) == Some(&KeptEdits::Held)
     }
 
     /// Whether stamps concern a chunk that is not resident.
@@ -146,7 +146,7 @@ impl Samples {
     /// What a chunk's samples lack when they come from the source.
     pub(super) fn replay(&self, position: [i32; 3], empty: Grid<i16>) -> Replay {
         let reported = match self.edited.get(&position) {
-            Some(Edited::Stamps { reported, .. }) => *reported,
+            Some(KeptEdits::Stamps { reported, .. }) => *reported,
             _ => 0,
         };
         let stamps = self.log.concerning(chunk_box(position), self.newest.chunk_region(position), 0);
@@ -158,14 +158,14 @@ impl Samples {
     pub(super) fn load(
         &mut self,
         position: [i32; 3],
-        chunk: Chunk<i16>,
+        chunk: GridChunk<i16>,
         replayed: Option<Replayed>,
     ) -> (Edit, BTreeSet<[i32; 3]>) {
-        self.newest.load(position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
+        self.newest.insert_clean(position, chunk).expect("a chunk of the extent, with the grid's own number of cells");
         let Replayed { through, changes, mut edit } = replayed.unwrap_or_else(Replayed::nothing);
         let late = self.log.concerning(chunk_box(position), self.newest.chunk_region(position), through);
         self.note_changes(position, changes, through, true);
-        for Logged { number, stamp, .. } in late {
+        for LoggedStamp { number, stamp, .. } in late {
             edit.merge(&self.change(position, number, &stamp));
         }
         (edit, self.newest.take_dirty())
@@ -173,23 +173,23 @@ impl Samples {
 
     /// Gives up a chunk's samples, unless they stay.
     pub(super) fn unload(&mut self, position: [i32; 3]) {
-        if !self.is_held(position) {
-            self.newest.unload(position);
+        if !self.touches_boundary(position) {
+            self.newest.remove_clean(position);
         }
     }
 
     /// Gives up the samples with which a chunk is drawn.
     pub(super) fn unload_shown(&mut self, position: [i32; 3]) {
-        if let Some(samples) = self.shown.unload(position) {
-            self.spare.keep(samples);
+        if let Some(samples) = self.shown.remove_clean(position) {
+            self.pool.keep(samples);
         }
     }
 
     /// Shows samples of a chunk.
-    pub(super) fn show(&mut self, position: [i32; 3], chunk: Chunk<i16>) {
-        if !self.shown.chunk(position).is_some_and(|shown| same_samples(shown, &chunk)) {
+    pub(super) fn show(&mut self, position: [i32; 3], chunk: GridChunk<i16>) {
+        if !self.shown.chunk(position).is_some_and(|shown| shares_samples(shown, &chunk)) {
             self.unload_shown(position);
-            self.shown.load(position, chunk).expect("a chunk of the same extent");
+            self.shown.insert_clean(position, chunk).expect("a chunk of the same extent");
         }
     }
 
@@ -203,9 +203,13 @@ impl Samples {
     /// Applies a stamp to all resident chunks, and keeps it for the others, also beyond the extent, which may grow; but not
     /// a stamp that lies wholly beyond. `before`: gets the chunks that it changes, as they were, unless they stand there
     /// already.
-    pub(super) fn stamp(&mut self, stamp: Stamp, before: &mut BTreeMap<[i32; 3], Chunk<i16>>) -> Changed {
+    pub(super) fn stamp(
+        &mut self,
+        stamp: QuantisedStamp,
+        before: &mut BTreeMap<[i32; 3], GridChunk<i16>>,
+    ) -> StampChanges {
         let mut changed =
-            Changed { edit: Edit::NONE, chunks: Vec::new(), affected: BTreeSet::new(), crowded: Vec::new() };
+            StampChanges { edit: Edit::NONE, chunks: Vec::new(), affected: BTreeSet::new(), crowded: Vec::new() };
         let touched = stamp.region();
         let Some(bounds) = self.newest.bounds().filter(|_| !touched.is_empty()) else { return changed };
         let ends = [touched.min, touched.max.map(|v| v - 1)].map(|end| self.newest.chunk_of(end));
@@ -227,10 +231,11 @@ impl Samples {
             }
         }
         changed.affected = self.newest.take_dirty();
-        let may_be_held = self.held > 0 && count(region) <= u64::from(MOST_STAMPS);
-        let held = if may_be_held { region.points().filter(|position| self.is_held(*position)).count() } else { 0 };
+        let may_be_held = self.held > 0 && count(region) <= u64::from(MAX_STAMPS);
+        let held =
+            if may_be_held { region.points().filter(|position| self.touches_boundary(*position)).count() } else { 0 };
         let at_node = self.log.insert(number, stamp, region, held as u32);
-        if at_node > MOST_STAMPS as usize {
+        if at_node > MAX_STAMPS as usize {
             let seen = region.intersection(&bounds);
             changed.crowded = seen.points().filter(|position| self.is_crowded(*position)).collect();
         }
@@ -240,7 +245,7 @@ impl Samples {
     /// Whether a chunk is not resident and has so many stamps that its samples take less.
     fn is_crowded(&self, position: [i32; 3]) -> bool {
         let stamps = || self.log.concerning(chunk_box(position), self.newest.chunk_region(position), 0).len();
-        !self.is_resident(position) && stamps() > MOST_STAMPS as usize
+        !self.is_resident(position) && stamps() > MAX_STAMPS as usize
     }
 
     /// The resident chunks in a region, in order.
@@ -249,8 +254,8 @@ impl Samples {
     }
 
     /// Applies a stamp to a resident chunk. What changes beyond the extent is not reported.
-    fn change(&mut self, position: [i32; 3], number: u64, stamp: &Stamp) -> Edit {
-        let edit = self.newest.apply_to_chunk(position, stamp, &mut self.spare);
+    fn change(&mut self, position: [i32; 3], number: u64, stamp: &QuantisedStamp) -> Edit {
+        let edit = self.newest.apply_to_chunk(position, stamp, &mut self.pool);
         self.note_changes(position, u32::from(!edit.is_empty()), number, false);
         if is_seen(&self.newest, position) { edit } else { Edit::NONE }
     }
@@ -260,12 +265,12 @@ impl Samples {
         if changes == 0 {
             return;
         }
-        let edited = self.edited.entry(position).or_insert(Edited::Stamps { changes: 0, reported: 0 });
-        if let Edited::Stamps { changes: before, reported } = edited {
+        let edited = self.edited.entry(position).or_insert(KeptEdits::Stamps { changes: 0, reported: 0 });
+        if let KeptEdits::Stamps { changes: before, reported } = edited {
             *before = if afresh { changes } else { *before + changes };
             *reported = (*reported).max(through);
-            if *before > MOST_STAMPS {
-                *edited = Edited::Held;
+            if *before > MAX_STAMPS {
+                *edited = KeptEdits::Held;
                 self.held += 1;
                 self.log.release(position, self.newest.chunk_region(position));
             }
@@ -275,19 +280,19 @@ impl Samples {
 
 impl Replay {
     /// Applies the stamps to what the source gave, as the terrain's own samples would have taken them.
-    pub(crate) fn run(mut self, chunk: Chunk<i16>) -> (Chunk<i16>, Replayed) {
+    pub(crate) fn run(mut self, chunk: GridChunk<i16>) -> (GridChunk<i16>, Replayed) {
         let mut replayed = Replayed { through: self.through, ..Replayed::nothing() };
-        if self.stamps.is_empty() || self.grid.load(self.position, chunk.clone()).is_err() {
+        if self.stamps.is_empty() || self.grid.insert_clean(self.position, chunk.clone()).is_err() {
             return (chunk, replayed);
         }
-        for Logged { number, stamp, .. } in &self.stamps {
-            let edit = self.grid.apply_to_chunk(self.position, stamp, &mut SpareSamples::new());
+        for LoggedStamp { number, stamp, .. } in &self.stamps {
+            let edit = self.grid.apply_to_chunk(self.position, stamp, &mut SamplePool::new());
             replayed.changes += u32::from(!edit.is_empty());
             if *number > self.reported && is_seen(&self.grid, self.position) {
                 replayed.edit.merge(&edit);
             }
         }
-        (self.grid.unload(self.position).unwrap_or(chunk), replayed)
+        (self.grid.remove_clean(self.position).unwrap_or(chunk), replayed)
     }
 }
 
@@ -312,10 +317,10 @@ fn count(region: Region) -> u64 {
 }
 
 /// Whether two chunks are known to be the same without looking at their samples.
-pub(crate) fn same_samples(a: &Chunk<i16>, b: &Chunk<i16>) -> bool {
+pub(crate) fn shares_samples(a: &GridChunk<i16>, b: &GridChunk<i16>) -> bool {
     match (a, b) {
-        (Chunk::Uniform(a), Chunk::Uniform(b)) => a == b,
-        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
+        (GridChunk::Uniform(a), GridChunk::Uniform(b)) => a == b,
+        (GridChunk::Samples(a), GridChunk::Samples(b)) => Arc::ptr_eq(a, b),
         _ => false,
     }
 }

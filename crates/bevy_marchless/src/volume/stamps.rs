@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_platform::collections::HashMap;
-use marchless::{Region, Stamp};
+use marchless::{QuantisedStamp, Region};
 
 /// The stamps that samples do not hold for good yet: those of chunks whose samples are not there, and those that are
 /// applied again when samples are had from the source again.
@@ -13,7 +13,7 @@ use marchless::{Region, Stamp};
 /// eight nodes of each level that has stamps, however many stamps there are elsewhere.
 #[derive(Debug, Default)]
 pub(crate) struct StampLog {
-    nodes: HashMap<Node, Vec<Logged>>,
+    nodes: HashMap<Node, Vec<LoggedStamp>>,
     /// How many nodes of each level hold stamps.
     levels: [usize; LEVELS],
     /// The number of the latest stamp; they count up from 1.
@@ -22,9 +22,9 @@ pub(crate) struct StampLog {
 
 /// A stamp and its place in the order of all.
 #[derive(Clone, Debug)]
-pub(crate) struct Logged {
+pub(crate) struct LoggedStamp {
     pub(crate) number: u64,
-    pub(crate) stamp: Arc<Stamp>,
+    pub(crate) stamp: Arc<QuantisedStamp>,
     /// How many chunks it may still have to be applied to; `MANY` of them are not counted.
     chunks: u32,
 }
@@ -55,7 +55,7 @@ impl StampLog {
 
     /// Keeps a stamp. `region`: the chunks that it may change; not empty. `held`: how many of them need it no longer.
     /// Returns how many stamps now stand at the node of one chunk, where it is that small.
-    pub(crate) fn insert(&mut self, number: u64, stamp: Arc<Stamp>, region: Region, held: u32) -> usize {
+    pub(crate) fn insert(&mut self, number: u64, stamp: Arc<QuantisedStamp>, region: Region, held: u32) -> usize {
         let size = region.size();
         let all = size.into_iter().map(u64::from).product::<u64>();
         let chunks = if all > u64::from(MANY) { u32::MAX } else { all as u32 - held.min(all as u32) };
@@ -70,7 +70,7 @@ impl StampLog {
         if logged.is_empty() {
             self.levels[level as usize] += 1;
         }
-        logged.push(Logged { number, stamp, chunks });
+        logged.push(LoggedStamp { number, stamp, chunks });
         if level == 0 { logged.len() } else { 0 }
     }
 
@@ -82,7 +82,7 @@ impl StampLog {
     }
 
     /// The stamps after number `after` that may change a box of chunks, in order. `points`: the lattice points of the box.
-    pub(crate) fn concerning(&self, chunks: Region, points: Region, after: u64) -> Vec<Logged> {
+    pub(crate) fn concerning(&self, chunks: Region, points: Region, after: u64) -> Vec<LoggedStamp> {
         let mut all = Vec::new();
         self.each_near(chunks, &mut |logged| all.extend(after_in(logged, points, after).cloned()));
         all.sort_unstable_by_key(|logged| logged.number);
@@ -119,17 +119,17 @@ impl StampLog {
     }
 
     /// Goes through the nodes that may hold stamps on some of `chunks`.
-    fn each_near(&self, chunks: Region, look: &mut impl FnMut(&[Logged])) {
+    fn each_near(&self, chunks: Region, appearance: &mut impl FnMut(&[LoggedStamp])) {
         let near = (0..).zip(&self.levels).filter(|(_, nodes)| **nodes > 0);
         for (level, nodes) in near {
             let around = around(level, chunks);
             if around.size().into_iter().map(u64::from).product::<u64>() <= *nodes as u64 {
                 let nodes = around.points().filter_map(|position| self.nodes.get(&Node { level, position }));
-                nodes.for_each(|logged| look(logged));
+                nodes.for_each(|logged| appearance(logged));
             } else {
                 let is_near = |node: &Node| node.level == level && around.contains(node.position);
                 let nodes = self.nodes.iter().filter(|(node, _)| is_near(node));
-                nodes.for_each(|(_, logged)| look(logged));
+                nodes.for_each(|(_, logged)| appearance(logged));
             }
         }
     }
@@ -152,22 +152,22 @@ fn one(chunk: [i32; 3]) -> Region {
 }
 
 /// Stamps of a node stand in order.
-fn after_in(logged: &[Logged], points: Region, after: u64) -> impl Iterator<Item = &Logged> {
+fn after_in(logged: &[LoggedStamp], points: Region, after: u64) -> impl Iterator<Item = &LoggedStamp> {
     let start = logged.partition_point(|logged| logged.number <= after);
     logged[start..].iter().filter(move |logged| !logged.stamp.region().intersection(&points).is_empty())
 }
 
 #[cfg(test)]
 mod tests {
-    use marchless::{BrushShape, Operation};
+    use marchless::{Operation, QuantisedShape};
     use proptest::prelude::*;
 
     use super::*;
 
     const CELLS: i32 = 8;
 
-    fn stamp(center: [f64; 3], radius: f64) -> Stamp {
-        Stamp::new(BrushShape::sphere(center, radius).unwrap(), Operation::Dig, 0)
+    fn stamp(center: [f64; 3], radius: f64) -> QuantisedStamp {
+        QuantisedStamp::new(QuantisedShape::sphere(center, radius).unwrap(), Operation::Dig, 0)
     }
 
     /// The chunks that a box of points lies in.
@@ -196,7 +196,7 @@ mod tests {
                 let region = Region::new(min, min.map(|v| v + size));
                 let found: Vec<_> =
                     log.concerning(region, points(region), after).iter().map(|logged| logged.number).collect();
-                let touches = |stamp: &Stamp| !stamp.region().intersection(&points(region)).is_empty();
+                let touches = |stamp: &QuantisedStamp| !stamp.region().intersection(&points(region)).is_empty();
                 let expected: Vec<_> = (1..).zip(&stamps)
                     .filter(|(number, stamp)| *number > after && touches(stamp)).map(|(number, _)| number).collect();
                 prop_assert_eq!(found, expected);
@@ -243,8 +243,8 @@ mod tests {
     #[test]
     fn the_ends_of_the_lattice_are_no_exception() {
         let mut log = StampLog::default();
-        let shape = BrushShape::sphere([f64::from(1 << 30), -f64::from(1 << 30), 0.0], 1_024.0).unwrap();
-        let stamp = Stamp::new(shape, Operation::Dig, 0);
+        let shape = QuantisedShape::sphere([f64::from(1 << 30), -f64::from(1 << 30), 0.0], 1_024.0).unwrap();
+        let stamp = QuantisedStamp::new(shape, Operation::Dig, 0);
         let touched = chunks(stamp.region());
         let number = log.next();
         log.insert(number, Arc::new(stamp), touched, 0);

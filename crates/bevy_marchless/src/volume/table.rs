@@ -10,13 +10,13 @@ use std::sync::Arc;
 use bevy_ecs::entity::Entity;
 use marchless::{MeshBuffer, Region};
 
-pub(crate) use entry::{Counts, Drawn, Shown};
+pub(crate) use entry::{Counts, DrawnMesh, Shown};
 use entry::{Entry, Fill, Role};
 use map::ChunkMap;
 
-use super::Signs;
+use super::KnownSigns;
 use crate::chunk::ChunkKey;
-use crate::cover::{LeafState, UniqueQueue, Wanted};
+use crate::cover::{LeafState, Residency, UniqueQueue};
 use crate::jobs::Ticket;
 
 /// Every loaded chunk of a terrain. Each event is one function; all counts are kept here.
@@ -48,7 +48,7 @@ pub(crate) enum Unloaded {
 
 /// Where to show a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum ShowTarget {
     /// Nowhere: there is nothing to show, or nobody wants it any more.
     Nowhere,
     /// On its entity.
@@ -101,9 +101,9 @@ impl ChunkTable {
     }
 
     /// A chunk came into range.
-    pub(super) fn load(&mut self, key: ChunkKey, wanted: Wanted) {
-        let role = if wanted == Wanted::Mesh { Role::NEW_LEAF } else { Role::Support };
-        let entry = Entry { role, fill: Fill::Unasked, signs: Signs::UNKNOWN, is_outdated: false };
+    pub(super) fn load(&mut self, key: ChunkKey, wanted: Residency) {
+        let role = if wanted == Residency::Mesh { Role::NEW_LEAF } else { Role::Support };
+        let entry = Entry { role, fill: Fill::Unasked, signs: KnownSigns::UNKNOWN, is_outdated: false };
         self.counts.add(&entry);
         if let Some(former) = self.chunks.insert(key, entry) {
             debug_assert!(false, "{key:?} was loaded already");
@@ -154,7 +154,7 @@ impl ChunkTable {
     }
 
     /// A chunk's samples are there. `signs`: where they are known.
-    pub(super) fn samples_arrived(&mut self, key: ChunkKey, signs: Option<Signs>) {
+    pub(super) fn samples_arrived(&mut self, key: ChunkKey, signs: Option<KnownSigns>) {
         let was_filled = self.is_filled(key);
         self.change(key, |entry| {
             entry.fill = Fill::Resident;
@@ -168,7 +168,7 @@ impl ChunkTable {
 
     /// Stamps have changed a chunk's samples.
     pub(super) fn samples_changed(&mut self, key: ChunkKey) {
-        self.chunks.change(key, |entry| entry.signs = Signs::UNKNOWN);
+        self.chunks.change(key, |entry| entry.signs = KnownSigns::UNKNOWN);
     }
 
     /// A chunk's samples have been dropped; they can be had again.
@@ -218,38 +218,38 @@ impl ChunkTable {
     }
 
     /// A chunk's mesh has the look of this number, though its geometry is what it was.
-    pub(super) fn set_look(&mut self, key: ChunkKey, look: u64) {
+    pub(super) fn set_appearance(&mut self, key: ChunkKey, appearance: u64) {
         self.change(key, |entry| {
             if let Role::Leaf { shown: Shown::Mesh(drawn), .. } = &mut entry.role {
-                drawn.look = look;
+                drawn.appearance = appearance;
             }
         });
     }
 
     /// A chunk has been meshed, and is to be shown so. Returns where; for a new entity, [`spawned`](Self::spawned) follows.
-    pub(super) fn meshed(&mut self, key: ChunkKey, geometry: &Arc<MeshBuffer>, look: u64) -> Place {
-        let mut place = Place::Nowhere;
+    pub(super) fn meshed(&mut self, key: ChunkKey, geometry: &Arc<MeshBuffer>, appearance: u64) -> ShowTarget {
+        let mut place = ShowTarget::Nowhere;
         self.change(key, |entry| {
             let Role::Leaf { shown, is_stale } = &mut entry.role else { return };
             if let Shown::Mesh(drawn) = shown
                 && Arc::ptr_eq(&drawn.geometry, geometry)
             {
                 // Its colours are other ones, but it is as old as it was.
-                drawn.look = look;
-                place = Place::Recolored(drawn.entity);
+                drawn.appearance = appearance;
+                place = ShowTarget::Recolored(drawn.entity);
                 return;
             }
             (*is_stale, entry.is_outdated) = (false, false);
             match shown {
                 Shown::Despawned => {}
                 Shown::Nothing | Shown::Empty if geometry.is_empty() => *shown = Shown::Empty,
-                Shown::Nothing | Shown::Empty => place = Place::New,
+                Shown::Nothing | Shown::Empty => place = ShowTarget::New,
                 Shown::Mesh(drawn) => {
                     if !(drawn.geometry.is_empty() && geometry.is_empty()) {
-                        place = Place::On(drawn.entity);
+                        place = ShowTarget::On(drawn.entity);
                         drawn.geometry = geometry.clone();
                     }
-                    drawn.look = look;
+                    drawn.appearance = appearance;
                 }
             }
         });
@@ -257,7 +257,7 @@ impl ChunkTable {
     }
 
     /// A chunk's mesh is on this new entity.
-    pub(super) fn spawned(&mut self, key: ChunkKey, drawn: Drawn) {
+    pub(super) fn spawned(&mut self, key: ChunkKey, drawn: DrawnMesh) {
         self.change(key, |entry| {
             if let Role::Leaf { shown, .. } = &mut entry.role {
                 *shown = Shown::Mesh(drawn);
@@ -286,7 +286,7 @@ impl ChunkTable {
         let mut counts = Counts::default();
         self.chunks.change_all(|entry| {
             entry.fill = Fill::Unasked;
-            entry.signs = Signs::UNKNOWN;
+            entry.signs = KnownSigns::UNKNOWN;
             if let Role::Leaf { shown, is_stale } = &mut entry.role {
                 *is_stale = matches!(shown, Shown::Empty | Shown::Mesh(_));
             }

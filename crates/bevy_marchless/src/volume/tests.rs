@@ -6,12 +6,13 @@ use std::time::Duration;
 use bevy_ecs::entity::Entity;
 use bevy_platform::time::Instant;
 use marchless::{
-    BrushShape, Grid, MeshBuffer, MeshSettings, Mesher, NeighbourhoodView, Operation, Region, SpareSamples, Stamp,
+    Grid, MeshBuffer, MeshSettings, Mesher, NeighbourhoodView, Operation, QuantisedShape, QuantisedStamp, Region,
+    SamplePool,
 };
 use proptest::prelude::*;
 
 use super::*;
-use crate::cover::{Range, View};
+use crate::cover::{LoadRegion, View};
 use crate::jobs::{Priority, WorkQueue, do_next};
 use crate::stats::TerrainStats;
 
@@ -30,7 +31,7 @@ const EXTENTS: [Region; 4] = [
 #[derive(Clone, Debug)]
 enum Event {
     View { viewer: u32, view: Option<([f64; 3], f64, f64, Option<f64>)> },
-    Stamp { center: [f64; 3], radius: f64, add: bool },
+    QuantisedStamp { center: [f64; 3], radius: f64, add: bool },
     Despawn { index: usize },
     Source { shift: f64 },
     Colors,
@@ -46,7 +47,7 @@ fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
         4 => (0u32..3, prop::option::weighted(0.8, view)).prop_map(|(viewer, view)| Event::View { viewer, view }),
         6 => (place(), 0.1..1.5f64, any::<bool>())
-            .prop_map(|(center, radius, add)| Event::Stamp { center, radius, add }),
+            .prop_map(|(center, radius, add)| Event::QuantisedStamp { center, radius, add }),
         1 => (0usize..100).prop_map(|index| Event::Despawn { index }),
         1 => (-4.0..4.0f64).prop_map(|shift| Event::Source { shift }),
         1 => Just(Event::Colors),
@@ -69,16 +70,16 @@ struct Game {
     views: HashMap<u32, ([f64; 3], f64, f64, Option<f64>)>,
     next_entity: u32,
     /// The stamps since the source began, and those that wait.
-    stamps: Vec<Stamp>,
-    waiting: Vec<Stamp>,
-    recipe: Recipe,
+    stamps: Vec<QuantisedStamp>,
+    waiting: Vec<QuantisedStamp>,
+    recipe: SamplingSettings,
     normals: bool,
     isovalue: f32,
 }
 
-fn recipe(shift: f64, extent: Region) -> Recipe {
+fn recipe(shift: f64, extent: Region) -> SamplingSettings {
     let hills = move |[x, y, z]: [f64; 3]| y - shift - 3.0 * (x * 0.2).sin() * (z * 0.15).cos();
-    Recipe { source: Arc::new(hills), extent, cells: CELLS, spacing: 1.0 }
+    SamplingSettings { source: Arc::new(hills), extent, cells: CELLS, spacing: 1.0 }
 }
 
 fn colors() -> Colors {
@@ -111,13 +112,13 @@ impl Game {
                     Some(view) => _ = self.views.insert(viewer, view),
                     None => _ = self.views.remove(&viewer),
                 }
-                self.look(viewer);
+                self.appearance(viewer);
             }
-            Event::Stamp { center, radius, add } => {
+            Event::QuantisedStamp { center, radius, add } => {
                 let scale = f64::from(CELLS);
-                let shape = BrushShape::sphere(center.map(|v| v * scale), radius * scale).expect("in range");
+                let shape = QuantisedShape::sphere(center.map(|v| v * scale), radius * scale).expect("in range");
                 let operation = if add { Operation::Add } else { Operation::Dig };
-                self.waiting.push(Stamp::new(shape, operation, 3).with_isovalue(self.isovalue));
+                self.waiting.push(QuantisedStamp::new(shape, operation, 3).with_isovalue(self.isovalue));
             }
             Event::Despawn { index } => {
                 let mut all: Vec<_> = self.screen.iter().map(|(entity, (key, _))| (*key, *entity)).collect();
@@ -136,10 +137,10 @@ impl Game {
                     self.waiting.clear();
                 }
             }
-            Event::Colors => self.heart.set_look(self.normals, colors()),
+            Event::Colors => self.heart.set_appearance(self.normals, colors()),
             Event::Normals => {
                 self.normals = !self.normals;
-                self.heart.set_look(self.normals, colors());
+                self.heart.set_appearance(self.normals, colors());
             }
             Event::Isovalue { isovalue } => {
                 self.isovalue = isovalue;
@@ -150,18 +151,18 @@ impl Game {
                 self.heart.resize(EXTENTS[index]);
                 let mut viewers: Vec<u32> = self.views.keys().copied().collect();
                 viewers.sort_unstable();
-                viewers.into_iter().for_each(|viewer| self.look(viewer));
+                viewers.into_iter().for_each(|viewer| self.appearance(viewer));
             }
             Event::Update { jobs, inline, late } => self.update(jobs, inline, late),
         }
     }
 
     /// Tells the heart what a viewer sees.
-    fn look(&mut self, viewer: u32) {
+    fn appearance(&mut self, viewer: u32) {
         let extent = self.recipe.extent;
         let view = self.views.get(&viewer).map(|&(middle, radius, margin, samples)| {
-            let range = Range::ellipsoid(middle, [radius; 3], extent);
-            let samples = samples.map(|samples| Range::ellipsoid(middle, [samples + 0.1; 3], extent));
+            let range = LoadRegion::ellipsoid(middle, [radius; 3], extent);
+            let samples = samples.map(|samples| LoadRegion::ellipsoid(middle, [samples + 0.1; 3], extent));
             View::new(range, margin, samples, [1.0, 0.0, 0.0])
         });
         self.heart.set_view(Entity::from_raw_u32(viewer), view);
@@ -228,7 +229,7 @@ impl Game {
                     let results = self.heart.meshed().clone();
                     self.heart.start_recolor(group, |id| {
                         self.queue.push(Priority::Restyle, move || {
-                            let meshed = Meshed { geometry, ..Meshed::empty(key.position) };
+                            let meshed = ChunkMesh { geometry, ..ChunkMesh::empty(key.position) };
                             results.push(MeshResult::OfGroup(id, meshed));
                         })
                     });
@@ -245,17 +246,17 @@ impl Game {
         }
         while let Some((key, job, settings)) = self.heart.next_in_transition(8) {
             let samples = self.heart.samples().neighbourhood(key.position).to_neighbourhood();
-            let (results, look) = (self.heart.meshed().clone(), self.heart.look());
+            let (results, appearance) = (self.heart.meshed().clone(), self.heart.appearance());
             let ticket = self.queue.push(Priority::Restyle, move || {
                 let meshed = meshed(&samples.view(), key.position, &settings);
-                results.push(MeshResult::Restyled(Restyled { job, meshed, look }));
+                results.push(MeshResult::Restyled(Restyled { job, meshed, appearance }));
             });
             self.heart.started_in_transition(key, job, ticket);
         }
     }
 
-    fn show_now(&mut self, prepared: Prepared) {
-        let Prepared { mut group, to_mesh } = prepared;
+    fn show_now(&mut self, prepared: PreparedGroup) {
+        let PreparedGroup { mut group, to_mesh } = prepared;
         let settings = self.heart.mesh_settings();
         for position in to_mesh {
             group.push(meshed(&self.heart.samples().neighbourhood(position), position, &settings));
@@ -264,7 +265,7 @@ impl Game {
         self.show(shown);
     }
 
-    fn start(&mut self, prepared: Prepared, priority: Priority) {
+    fn start(&mut self, prepared: PreparedGroup, priority: Priority) {
         if prepared.to_mesh.is_empty() {
             return self.show_now(prepared);
         }
@@ -279,22 +280,22 @@ impl Game {
     }
 
     fn show(&mut self, shown: Shown) {
-        for Swap { key, place, meshed, look } in shown.swaps {
+        for Swap { key, place, meshed, appearance } in shown.swaps {
             match place {
-                Place::Nowhere => {}
-                Place::On(entity) => {
+                ShowTarget::Nowhere => {}
+                ShowTarget::On(entity) => {
                     let on_screen = self.screen.get_mut(&entity).expect("it is on the screen");
                     assert_eq!(on_screen.0, key);
                     on_screen.1 = meshed.geometry;
                 }
-                Place::Recolored(entity) => {
+                ShowTarget::Recolored(entity) => {
                     assert!(Arc::ptr_eq(&self.screen[&entity].1, &meshed.geometry), "the same geometry");
                 }
-                Place::New => {
+                ShowTarget::New => {
                     let entity = Entity::from_raw_u32(self.next_entity).expect("few entities");
                     self.next_entity += 1;
                     self.screen.insert(entity, (key, meshed.geometry.clone()));
-                    self.heart.spawned(key, Drawn { entity, geometry: meshed.geometry, look });
+                    self.heart.spawned(key, DrawnMesh { entity, geometry: meshed.geometry, appearance });
                 }
             }
         }
@@ -315,7 +316,7 @@ impl Game {
         for position in WHOLE.points() {
             let key = ChunkKey::finest(position);
             let (filled, resident) = (heart.table.is_filled(key), heart.samples.is_resident(position));
-            let may_be_resident = filled || heart.samples.is_held(position);
+            let may_be_resident = filled || heart.samples.touches_boundary(position);
             assert!(resident == filled || resident && may_be_resident, "{position:?}: {filled}, {resident}");
         }
         for queue in [heart.arriving.len(), heart.to_fill.len(), heart.to_mesh.len()] {
@@ -324,7 +325,7 @@ impl Game {
     }
 
     /// Updates until nothing waits; then everything is as if it had always been so.
-    fn settle(&mut self) {
+    fn follow_residency(&mut self) {
         for _ in 0..2_000 {
             self.update(30, 8, false);
             if self.heart.is_settled() && self.waiting.is_empty() {
@@ -344,9 +345,9 @@ impl Game {
         let mut fresh = Grid::<i16>::bounded(CELLS, extent).expect("a good extent");
         for position in extent.points() {
             let source = self.recipe.source.as_ref();
-            fresh.load(position, Chunk::from_source(source, position, CELLS, 1.0)).expect("a chunk of it");
+            fresh.insert_clean(position, GridChunk::from_source(source, position, CELLS, 1.0)).expect("a chunk of it");
             for stamp in &self.stamps {
-                fresh.apply_to_chunk(position, stamp, &mut SpareSamples::new());
+                fresh.apply_to_chunk(position, stamp, &mut SamplePool::new());
             }
         }
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
@@ -367,18 +368,18 @@ impl Game {
                 assert_eq!(state, wanted, "{position:?}");
                 if let Some(drawn) = heart.table.drawn(key).filter(|drawn| !drawn.geometry.is_empty()) {
                     assert!(*drawn.geometry == *expected, "the mesh of {position:?}");
-                    assert_eq!(drawn.look, heart.look(), "the look of {position:?}");
+                    assert_eq!(drawn.appearance, heart.appearance(), "the appearance of {position:?}");
                 }
             }
         }
     }
 }
 
-fn meshed(samples: &NeighbourhoodView<'_, i16>, position: [i32; 3], settings: &MeshSettings) -> Meshed {
+fn meshed(samples: &NeighbourhoodView<'_, i16>, position: [i32; 3], settings: &MeshSettings) -> ChunkMesh {
     let mut geometry = MeshBuffer::new();
     let mut block = marchless::Block::new();
     samples.mesh(&mut Mesher::new(), &mut block, settings, &mut geometry).expect("samples of a chunk");
-    Meshed { geometry: Arc::new(geometry), ..Meshed::empty(position) }
+    ChunkMesh { geometry: Arc::new(geometry), ..ChunkMesh::empty(position) }
 }
 
 proptest! {
@@ -390,12 +391,12 @@ proptest! {
         for event in &events {
             game.happen(event);
         }
-        game.settle();
+        game.follow_residency();
         // And again, from there.
         for event in events.iter().rev() {
             game.happen(event);
         }
-        game.settle();
+        game.follow_residency();
     }
 
     #[test]
@@ -405,10 +406,10 @@ proptest! {
             let x = if here { -3.0 } else { 3.5 };
             let view = Some(([x + 0.3 * angle.cos(), 0.0, 0.3 * angle.sin()], 1.5, 0.5, Some(0.5)));
             game.happen(&Event::View { viewer: 1, view });
-            game.happen(&Event::Stamp { center: [x, 0.0, 0.0], radius: 0.5, add: here });
+            game.happen(&Event::QuantisedStamp { center: [x, 0.0, 0.0], radius: 0.5, add: here });
             game.update(0, 0, true);
         }
-        game.settle();
+        game.follow_residency();
     }
 }
 
@@ -416,7 +417,7 @@ proptest! {
 fn another_source_comes_after_the_game_has_despawned_all_there_was() {
     let mut game = Game::new();
     game.happen(&Event::View { viewer: 0, view: Some(([-1.7, 0.7, -0.4], 0.2, 0.0, None)) });
-    game.settle();
+    game.follow_residency();
     while !game.screen.is_empty() {
         game.happen(&Event::Despawn { index: 0 });
     }
@@ -424,6 +425,6 @@ fn another_source_comes_after_the_game_has_despawned_all_there_was() {
         let before = game.heart.samples().generation();
         game.happen(&Event::Source { shift });
         assert_ne!(game.heart.samples().generation(), before);
-        game.settle();
+        game.follow_residency();
     }
 }

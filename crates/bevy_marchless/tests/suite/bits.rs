@@ -6,7 +6,9 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce as _;
+use bevy_marchless::bits::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use bevy_math::{DVec3, IVec3, UVec3, Vec3};
 use bevy_tasks::block_on;
 use marchless::Shape;
@@ -38,7 +40,7 @@ impl Oracle {
     }
 
     /// The points that a way along the axes leads to.
-    fn piece(&self, first: [i32; 3], region: Region) -> BTreeSet<[i32; 3]> {
+    fn island(&self, first: [i32; 3], region: Region) -> BTreeSet<[i32; 3]> {
         let mut found = BTreeSet::new();
         let mut next = vec![first];
         while let Some(point) = next.pop() {
@@ -167,7 +169,7 @@ fn answers_are_those_of_the_samples_at_other_isovalues_and_in_uniform_chunks() {
     let terrain = settled(&mut app, Terrain::new(deep).with_extent(UVec3::new(5, 6, 5)).with_chunk_cells(16));
     let grid = volume(&app, terrain).grid();
     for (chunk, solid) in [([2, 1, 2], true), ([2, 5, 2], false)] {
-        let Some(marchless::Chunk::Uniform(voxel)) = grid.chunk(chunk) else { panic!("{chunk:?} is not uniform") };
+        let Some(marchless::GridChunk::Uniform(voxel)) = grid.chunk(chunk) else { panic!("{chunk:?} is not uniform") };
         assert_eq!(voxel.weight < 0, solid);
     }
     assert_answers(&mut app, terrain);
@@ -216,15 +218,15 @@ fn questions_without_an_answer_say_why() {
         let bits = ask(&mut app, move |bits| bits.bits(terrain, region));
         assert_eq!(bits, Err(TerrainBitsError::TooLarge { region }));
         // What lies outside the terrain is nothing but air.
-        let pieces = ask(&mut app, move |bits| bits.pieces(terrain, region)).expect("the terrain is small");
-        assert!(pieces.len() <= 1 && pieces.iter().all(Piece::is_held));
+        let islands = ask(&mut app, move |bits| bits.islands(terrain, region)).expect("the terrain is small");
+        assert!(islands.len() <= 1 && islands.iter().all(Island::touches_boundary));
         assert!(ask(&mut app, move |bits| bits.is_solid(terrain, region)) == Ok(false));
     }
     for region in [Region::new([9; 3], [3; 3]), Region::new([i32::MAX; 3], [i32::MIN; 3])] {
         assert_eq!(ask(&mut app, move |bits| bits.bits(terrain, region)), Err(TerrainBitsError::Empty { region }));
-        assert_eq!(ask(&mut app, move |bits| bits.pieces(terrain, region)), Ok(vec![]));
+        assert_eq!(ask(&mut app, move |bits| bits.islands(terrain, region)), Ok(vec![]));
         let ends = [IVec3::splat(3), IVec3::splat(4)];
-        for medium in [Medium::Solid, Medium::Air] {
+        for medium in [Phase::Solid, Phase::Air] {
             let connected = ask(&mut app, move |bits| bits.connected(terrain, ends[0], ends[1], region, medium));
             assert_eq!(connected, Ok(false));
         }
@@ -238,12 +240,12 @@ fn questions_without_an_answer_say_why() {
 
 #[test]
 fn what_is_connected_depends_on_the_box_and_on_edits() {
-    use Medium::{Air, Solid};
+    use Phase::{Air, Solid};
     let mut app = app();
     let terrain = settled(&mut app, ground());
     let whole = Region::new([-1; 3], [34; 3]);
     let [left, right] = [IVec3::new(4, 8, 16), IVec3::new(28, 8, 16)];
-    let connected = |app: &mut App, a: IVec3, b: IVec3, region: Region, medium: Medium| {
+    let connected = |app: &mut App, a: IVec3, b: IVec3, region: Region, medium: Phase| {
         ask(app, move |bits| bits.connected(terrain, a, b, region, medium)).expect("a small box")
     };
     assert!(connected(&mut app, left, right, whole, Solid));
@@ -289,13 +291,13 @@ fn app_with_edits() -> App {
 }
 
 /// Applies a stamp and finds what hangs free around what it has changed.
-fn loosened_by(app: &mut App, by: Stamp) -> Vec<Piece> {
+fn loosened_by(app: &mut App, by: Stamp) -> Vec<Island> {
     stamp(app, by);
     app.update();
     let edits = core::mem::take(&mut app.world_mut().resource_mut::<Edits>().0);
     let [edited] = &edits[..] else { panic!("one edit: {edits:?}") };
     let edited = edited.clone();
-    ask(app, move |bits| bits.loose_pieces(&edited, 30)).expect("a small box")
+    ask(app, move |bits| bits.loose_islands(&edited, 30)).expect("a small box")
 }
 
 #[test]
@@ -306,27 +308,27 @@ fn a_head_hangs_free_once_its_pillar_is_cut_and_can_be_dug_out() {
     assert_eq!(loosened_by(&mut app, side), [], "something of the pillar is left");
     let cut = Stamp::dig(terrain, BrushShape::sphere(Vec3::new(24.0, 18.0, 24.0), 5.0));
     let loose = loosened_by(&mut app, cut);
-    let [head] = &loose[..] else { panic!("one piece: {loose:?}") };
+    let [head] = &loose[..] else { panic!("one island: {loose:?}") };
 
     let oracle = Oracle::new(&app, terrain);
     let whole = Region::new([0; 3], [48; 3]);
-    let expected = oracle.piece([24, 34, 24], whole);
+    let expected = oracle.island([24, 34, 24], whole);
     assert!(head.size() > 1_300 && head.size() == expected.len(), "{head:?}");
     let min = head.bounds().min;
     let at = |p: [u32; 3]| [0, 1, 2].map(|axis| min[axis] + p[axis] as i32);
     assert_eq!(head.bits().iter().map(at).collect::<BTreeSet<_>>(), expected);
 
-    let pieces = ask(&mut app, move |bits| bits.pieces(terrain, whole)).unwrap();
-    let [ground, same] = &pieces[..] else { panic!("the ground and the head: {pieces:?}") };
-    assert!(ground.is_held() && same == head && ground.size() + head.size() == oracle.0.len());
+    let islands = ask(&mut app, move |bits| bits.islands(terrain, whole)).unwrap();
+    let [ground, same] = &islands[..] else { panic!("the ground and the head: {islands:?}") };
+    assert!(ground.touches_boundary() && same == head && ground.size() + head.size() == oracle.0.len());
     // Too small a box cuts through it, so that nobody knows.
     let [min, max] = [head.bounds().min, head.bounds().max];
     let small = Region::new([min[0] - 1, min[1] + 2, min[2] - 1], max.map(|v| v + 1));
-    let pieces = ask(&mut app, move |bits| bits.pieces(terrain, small)).unwrap();
-    assert!(pieces.iter().all(Piece::is_held), "{pieces:?}");
+    let islands = ask(&mut app, move |bits| bits.islands(terrain, small)).unwrap();
+    assert!(islands.iter().all(Island::touches_boundary), "{islands:?}");
 
-    let piece = head.clone();
-    let samples = ask(&mut app, move |bits| bits.samples(terrain, &piece)).expect("a terrain");
+    let island = head.clone();
+    let samples = ask(&mut app, move |bits| bits.samples(terrain, &island)).expect("a terrain");
     let (lowest, shape) = (min.map(|v| v - 2), samples.shape().as_ivec3().to_array());
     assert_eq!(shape, [0, 1, 2].map(|axis| head.bounds().max[axis] + 2 - lowest[axis]));
     for (index, point) in Region::new(lowest, [0, 1, 2].map(|axis| lowest[axis] + shape[axis])).points().enumerate() {
@@ -359,11 +361,11 @@ fn pieces_that_interlock_are_dug_out_one_by_one() {
         let source = move |p: [f64; 3]| (p[1] - 6.5).min(ring(p, false)).min(ring(p, true));
         let terrain = settled(&mut app, small(Terrain::new(source)).with_isovalue(isovalue as f32));
         let whole = Region::new([0; 3], [33; 3]);
-        let pieces = ask(&mut app, move |bits| bits.pieces(terrain, whole)).unwrap();
-        let loose: Vec<_> = pieces.iter().filter(|piece| !piece.is_held()).collect();
-        assert_eq!((pieces.len(), loose.len()), (3, 2), "{pieces:?}");
+        let islands = ask(&mut app, move |bits| bits.islands(terrain, whole)).unwrap();
+        let loose: Vec<_> = islands.iter().filter(|island| !island.touches_boundary()).collect();
+        assert_eq!((islands.len(), loose.len()), (3, 2), "{islands:?}");
         let before = Oracle::new(&app, terrain);
-        let ring = before.piece(loose[0].first().to_array(), whole);
+        let ring = before.island(loose[0].first().to_array(), whole);
         for stamp in loose[0].stamps(terrain) {
             app.world_mut().write_message(stamp);
         }
@@ -381,15 +383,15 @@ fn a_task_answers_as_asking_at_once_does_about_the_terrain_as_it_was() {
     let whole = Region::new([-2; 3], [50; 3]);
     let (foot, head) = (IVec3::new(24, 4, 24), IVec3::new(24, 34, 24));
     let now = ask(&mut app, move |bits| {
-        let connected = bits.connected(terrain, foot, head, whole, Medium::Solid);
-        (bits.pieces(terrain, whole).unwrap(), bits.bits(terrain, whole).unwrap(), connected.unwrap())
+        let connected = bits.connected(terrain, foot, head, whole, Phase::Solid);
+        (bits.islands(terrain, whole).unwrap(), bits.bits(terrain, whole).unwrap(), connected.unwrap())
     });
     assert_eq!((now.0.len(), now.2), (2, false));
     let tasks = ask(&mut app, move |bits| {
         let snapshot = bits.snapshot(terrain, whole).unwrap();
-        let connected = move |snapshot: &BitsSnapshot| snapshot.connected(foot, head, Medium::Solid);
+        let connected = move |snapshot: &BitsSnapshot| snapshot.connected(foot, head, Phase::Solid);
         (
-            snapshot.clone().in_task(BitsSnapshot::pieces),
+            snapshot.clone().in_task(BitsSnapshot::islands),
             snapshot.clone().in_task(BitsSnapshot::bits),
             snapshot.in_task(connected),
         )
@@ -399,7 +401,7 @@ fn a_task_answers_as_asking_at_once_does_about_the_terrain_as_it_was() {
     assert_eq!(block_on(tasks.0).unwrap(), now.0);
     assert_eq!(block_on(tasks.1).unwrap(), now.1);
     assert_eq!(block_on(tasks.2).unwrap(), now.2);
-    assert_eq!(earlier.pieces().unwrap(), now.0, "asked after the edit");
-    let after = ask(&mut app, move |bits| bits.connected(terrain, foot, head, whole, Medium::Solid));
+    assert_eq!(earlier.islands().unwrap(), now.0, "asked after the edit");
+    let after = ask(&mut app, move |bits| bits.connected(terrain, foot, head, whole, Phase::Solid));
     assert_eq!(after, Ok(true));
 }

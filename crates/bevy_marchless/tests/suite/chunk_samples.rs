@@ -4,6 +4,7 @@ use crate::common::*;
 use bevy_camera::primitives::Aabb;
 use bevy_camera::visibility::NoAutoAabb;
 use bevy_ecs::prelude::*;
+use bevy_marchless::mesh::ChunkSamples;
 use bevy_marchless::prelude::*;
 use bevy_math::{UVec3, Vec3};
 use bevy_mesh::Mesh3d;
@@ -48,7 +49,7 @@ fn samples_by_hand_get_a_mesh_and_another_after_each_change() {
 #[test]
 fn large_samples_are_meshed_in_tasks_and_the_newest_comes_last() {
     let mut app = app();
-    app.insert_resource(MarchlessSettings { inline_chunks: 0, ..MarchlessSettings::default() });
+    app.insert_resource(MarchlessSettings { max_inline_chunks: 0, ..MarchlessSettings::default() });
     let entity = app.world_mut().spawn(plane(40, 3.5)).id();
     app.update();
     app.world_mut().entity_mut(entity).insert(plane(40, 5.5));
@@ -82,7 +83,7 @@ fn bad_samples_are_refused_in_a_sentence() {
 #[test]
 fn a_late_mesh_of_removed_samples_is_not_shown() {
     let mut app = app_with_budget(1);
-    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let entity = app.world_mut().spawn(plane(9, 3.5)).id();
     // The first job has run, but its mesh has not been shown.
     app.update();
@@ -98,7 +99,7 @@ fn a_late_mesh_of_removed_samples_is_not_shown() {
 #[test]
 fn any_number_of_inline_chunks_may_be_asked_for() {
     let mut app = app();
-    app.insert_resource(MarchlessSettings { inline_chunks: usize::MAX, ..MarchlessSettings::default() });
+    app.insert_resource(MarchlessSettings { max_inline_chunks: usize::MAX, ..MarchlessSettings::default() });
     let entity = app.world_mut().spawn(plane(9, 3.5)).id();
     app.update();
     assert_eq!(heights(&app, entity), vec![3.5; 81]);

@@ -5,7 +5,9 @@ use bevy_app::App;
 use bevy_color::Color;
 use bevy_ecs::entity_disabling::Disabled;
 use bevy_ecs::prelude::*;
+use bevy_marchless::mesh::ChunkSamples;
 use bevy_marchless::prelude::*;
+use bevy_marchless::terrain::{SourceHandle, TerrainError, TerrainSources};
 use bevy_math::{UVec3, Vec3};
 use bevy_transform::components::Transform;
 
@@ -63,7 +65,7 @@ fn while_threads_load_it() {
 fn while_a_dig_is_meshed() {
     for before in [1, 2, 5] {
         let mut app = app_with_budget(1);
-        app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+        app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
         let terrain = settled(&mut app, ground());
         let first = write(&mut app, dig(terrain, Vec3::splat(16.0), 6.0));
         updates(&mut app, before);
@@ -82,7 +84,7 @@ fn while_a_dig_is_meshed() {
 #[test]
 fn its_chunks_may_be_disabled_with_it() {
     let mut app = app_with_budget(1);
-    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let terrain = settled(&mut app, ground());
     let first = write(&mut app, dig(terrain, Vec3::splat(16.0), 6.0));
     updates(&mut app, 3);
@@ -220,7 +222,7 @@ fn height(app: &App, entity: Entity) -> Option<f32> {
 #[test]
 fn samples_by_hand_whose_job_is_under_way() {
     let mut app = app_with_budget(1);
-    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let entity = app.world_mut().spawn(plane(3.5)).id();
     app.update();
     disable(&mut app, entity);
@@ -235,9 +237,9 @@ fn samples_by_hand_whose_job_is_under_way() {
 
 #[test]
 fn samples_by_hand_changed_meanwhile() {
-    for inline_chunks in [0, 8] {
+    for max_inline_chunks in [0, 8] {
         let mut app = app_with_budget(1);
-        app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = inline_chunks;
+        app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = max_inline_chunks;
         let entity = app.world_mut().spawn(plane(3.5)).id();
         updates(&mut app, 4);
         assert_eq!(height(&app, entity), Some(3.5));

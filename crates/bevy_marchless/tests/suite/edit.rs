@@ -4,6 +4,7 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 use bevy_math::{IVec3, Vec3};
 use std::sync::Arc;
 
@@ -61,7 +62,7 @@ fn what_changes_out_of_sight_is_shown_without_meshing() {
 #[test]
 fn a_group_too_large_for_the_update_changes_in_one_later_update() {
     let mut app = app();
-    app.insert_resource(MarchlessSettings { inline_chunks: 3, ..MarchlessSettings::default() });
+    app.insert_resource(MarchlessSettings { max_inline_chunks: 3, ..MarchlessSettings::default() });
     let terrain = settled(&mut app, ground());
     let before = geometry(&mut app, terrain);
     let stamp = Stamp::dig(terrain, BrushShape::sphere(Vec3::splat(16.0), 6.0));

@@ -7,6 +7,7 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 use bevy_math::{IVec3, UVec3, Vec3};
 
 fn hills(size: UVec3) -> Terrain {
@@ -97,7 +98,7 @@ fn viewers_and_what_is_kept_follow_the_extent() {
 fn many_chunks_are_passed_over_and_the_rest_is_budgeted() {
     let mut app = app();
     let terrain = settled(&mut app, hills(UVec3::new(48, 4, 48)));
-    app.insert_resource(MarchlessSettings { main_thread: Duration::from_micros(600), ..Default::default() });
+    app.insert_resource(MarchlessSettings { streaming_budget: Duration::from_micros(600), ..Default::default() });
     let before = app.world().resource::<TerrainStats>().loaded;
     resize(&mut app, terrain, Extent::new(IVec3::new(-1, -1, -1), IVec3::new(49, 5, 49)));
     app.update();

@@ -20,6 +20,10 @@ mod edit;
 mod extent;
 mod far_apart_digs;
 mod far_stamps;
+#[cfg(all(feature = "terrain_files", feature = "noise", feature = "png"))]
+mod file_follow;
+#[cfg(all(feature = "terrain_files", feature = "noise", feature = "png"))]
+mod file_text;
 mod fixed_update;
 mod hierarchy;
 mod isovalue;
@@ -68,7 +72,3 @@ mod stroke;
 mod two_apps;
 mod virtual_time;
 mod without_assets;
-#[cfg(all(feature = "world_files", feature = "noise", feature = "png"))]
-mod world_follow;
-#[cfg(all(feature = "world_files", feature = "noise", feature = "png"))]
-mod world_text;

@@ -4,6 +4,8 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_asset::{AssetApp as _, Assets, Handle};
 use bevy_ecs::prelude::*;
+use bevy_marchless::material::TerrainMaterialPlugin;
+use bevy_marchless::mesh::ChunkSamples;
 use bevy_marchless::prelude::*;
 use bevy_pbr::decal::ForwardDecalMaterial;
 use bevy_pbr::{Material, MeshMaterial3d, StandardMaterial};

@@ -4,6 +4,7 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_asset::{Assets, RenderAssetUsages};
 use bevy_color::Color;
+use bevy_marchless::mesh::ChunkSamples;
 use bevy_marchless::prelude::*;
 use bevy_math::{UVec3, Vec3};
 use bevy_mesh::{Mesh, Mesh3d};
@@ -27,9 +28,9 @@ fn set(app: &mut App, usages: RenderAssetUsages) {
 
 #[test]
 fn chunks_meshed_by_jobs_and_at_once() {
-    for inline_chunks in [0, 8] {
+    for max_inline_chunks in [0, 8] {
         let mut app = app();
-        app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = inline_chunks;
+        app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = max_inline_chunks;
         let terrain = settled(&mut app, ball());
         assert_eq!(counts(&mut app), [8, 0], "the default");
         set(&mut app, BOTH);
@@ -81,9 +82,9 @@ fn other_colours_normals_and_isovalues() {
 fn samples_by_hand_at_once_and_by_jobs() {
     let distances: Vec<f32> = (0..729).map(|index| (index / 9 % 9) as f32 - 3.5).collect();
     let samples = ChunkSamples::from_distances(UVec3::splat(9), &distances).unwrap();
-    for inline_chunks in [0, 8] {
+    for max_inline_chunks in [0, 8] {
         let mut app = app_with_budget(4);
-        app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = inline_chunks;
+        app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = max_inline_chunks;
         app.world_mut().spawn(samples.clone());
         (0..4).for_each(|_| app.update());
         assert_eq!(counts(&mut app), [1, 0]);

@@ -6,6 +6,7 @@ use bevy_camera::primitives::Aabb;
 use bevy_ecs::prelude::*;
 use bevy_marchless::mesh::ATTRIBUTE_MATERIAL;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stream::Coverage;
 use bevy_mesh::{Mesh, Mesh3d};
 use bevy_transform::components::{GlobalTransform, Transform};
 

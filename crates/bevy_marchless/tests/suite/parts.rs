@@ -3,6 +3,7 @@
 use crate::common::*;
 use bevy_app::{App, PluginGroup as _, TaskPoolPlugin};
 use bevy_marchless::brush::BrushPlugin;
+use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
 use bevy_marchless::mesh::MeshingPlugin;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
@@ -12,7 +13,7 @@ use bevy_transform::components::Transform;
 #[test]
 fn samples_alone_need_no_meshing() {
     let mut app = App::new();
-    let parts = MarchlessPlugins.build().disable::<MeshingPlugin>().disable::<DebugPlugin>();
+    let parts = MarchlessPlugins.build().disable::<MeshingPlugin>().disable::<TerrainDiagnosticsPlugin>();
     app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, parts));
     let terrain = app.world_mut().spawn(ball()).id();
     app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::splat(16.0), 4.0)));

@@ -60,7 +60,7 @@ fn the_nearest_of_several_terrains_is_hit() {
 #[test]
 fn rays_hit_what_is_drawn_not_what_will_be() {
     let mut app = app_with_budget(1);
-    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let terrain = settled(&mut app, ground());
     let height = |app: &mut App| {
         let hit = cast(app, Vec3::new(15.3, 40.0, 15.6), Vec3::new(15.3, 0.0, 15.6), 100.0).expect("ground");

@@ -44,7 +44,7 @@ fn an_edit_while_a_chunk_is_being_filled_is_not_lost() {
 fn edits_while_a_group_is_being_meshed_show_after_it() {
     // One job an update, so that a group of eight takes eight updates.
     let mut app = app_with_budget(1);
-    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let terrain = settled(&mut app, ground());
     app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::splat(16.0), 6.0)));
     for _ in 0..4 {

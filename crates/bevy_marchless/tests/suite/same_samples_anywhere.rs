@@ -6,6 +6,7 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use bevy_math::{IVec3, Vec3};
 use bevy_transform::components::Transform;
 use std::time::Duration;

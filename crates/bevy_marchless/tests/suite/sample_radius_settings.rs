@@ -8,6 +8,7 @@ use bevy_app::App;
 use bevy_color::Color;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stream::LeafState;
 use bevy_math::{IVec3, Vec3};
 use bevy_transform::components::Transform;
 
@@ -57,10 +58,10 @@ fn assert_as_fresh(app: &mut App, terrain: Entity, stamps: &[Stamp]) {
 
 #[test]
 fn a_dig_shows_in_its_update_after_another_palette() {
-    let shares = [Duration::ZERO, MarchlessSettings::default().main_thread];
-    for (updates, main_thread) in shares.into_iter().flat_map(|share| [0, 10].map(|updates| (updates, share))) {
+    let shares = [Duration::ZERO, MarchlessSettings::default().streaming_budget];
+    for (updates, streaming_budget) in shares.into_iter().flat_map(|share| [0, 10].map(|updates| (updates, share))) {
         let (mut app, terrain) = far_seeing();
-        app.world_mut().resource_mut::<MarchlessSettings>().main_thread = main_thread;
+        app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = streaming_budget;
         let (first, shows) = dig_shows(&mut app, terrain, Vec3::new(4.0, -2.0, 4.0));
         assert!(shows, "before");
         settle(&mut app, terrain);

@@ -2,6 +2,8 @@
 
 use crate::common::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stream::Coverage;
+use bevy_marchless::terrain::TerrainError;
 use bevy_math::UVec3;
 
 #[test]

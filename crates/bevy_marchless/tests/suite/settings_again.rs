@@ -28,7 +28,7 @@ fn change(app: &mut App, terrain: Entity, change: impl FnOnce(&mut Terrain)) {
 /// Without threads, and with hardly any time for the main thread: each update does little, and always the same.
 fn slow_app() -> App {
     let mut app = app_with_budget(8);
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::ZERO;
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::ZERO;
     app
 }
 
@@ -62,10 +62,10 @@ fn another_isovalue_while_a_new_source_fills_the_terrain() {
 
 #[test]
 fn a_dig_while_a_new_source_fills_the_terrain() {
-    for inline_chunks in [0, 8] {
+    for max_inline_chunks in [0, 8] {
         for updates in [1, 5, 12] {
             let mut app = slow_app();
-            app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = inline_chunks;
+            app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = max_inline_chunks;
             let terrain = settled(&mut app, waves(8.0));
             let source = waves(9.5).source;
             change(&mut app, terrain, |terrain| terrain.source = source);
@@ -184,11 +184,11 @@ proptest! {
     fn any_mix_of_changes_settles_to_the_newest(
         changes in prop::collection::vec((changes(), 0u32..4), 1..24),
         budget in 1usize..6,
-        inline_chunks in prop_oneof![Just(0), Just(3), Just(8)],
-        main_thread in prop_oneof![Just(Duration::ZERO), Just(Duration::from_secs(1))],
+        max_inline_chunks in prop_oneof![Just(0), Just(3), Just(8)],
+        streaming_budget in prop_oneof![Just(Duration::ZERO), Just(Duration::from_secs(1))],
     ) {
         let mut app = app();
-        app.insert_resource(MarchlessSettings { budget: Some(budget), inline_chunks, main_thread, ..Default::default() });
+        app.insert_resource(MarchlessSettings { max_jobs_per_update: Some(budget), max_inline_chunks, streaming_budget, ..Default::default() });
         let terrain = settled(&mut app, waves(8.0).with_extent(UVec3::new(3, 2, 3)));
         let mut stamps = Vec::new();
         for (number, (change, updates)) in changes.into_iter().enumerate() {

@@ -2,6 +2,8 @@
 
 use crate::common::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
+use bevy_marchless::stream::{Coverage, LeafState};
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 

@@ -7,12 +7,15 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
+use bevy_marchless::stream::LeafState;
+use bevy_marchless::terrain::TerrainError;
 use bevy_math::{IVec3, Quat, Vec3};
 use bevy_transform::components::Transform;
 
 fn patient_app() -> App {
     let mut app = app_with_budget(16);
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_secs(5);
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
     app
 }
 
@@ -118,7 +121,7 @@ fn viewers_that_would_see_too_much() {
         let mut flight = settled_flight();
         let viewer = flight.viewers[0];
         let good = *flight.app.world().get::<TerrainViewer>(viewer).unwrap();
-        flight.app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_millis(2);
+        flight.app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_millis(2);
         let before = flight.drawn();
         flight.app.world_mut().get_mut::<TerrainViewer>(viewer).unwrap().radii = Vec3::splat(radius);
         for _ in 0..30 {
@@ -136,7 +139,7 @@ fn viewers_that_would_see_too_much() {
             assert!(leaves > most / 4, "radius {radius}: it is scaled down to {leaves} leaves");
         }
         *flight.app.world_mut().get_mut::<TerrainViewer>(viewer).unwrap() = good;
-        flight.app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_secs(5);
+        flight.app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
         flight.settle_and_compare();
     }
 }

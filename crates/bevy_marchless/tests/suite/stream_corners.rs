@@ -5,6 +5,7 @@ use std::time::Duration;
 use crate::common::*;
 use bevy_app::prelude::*;
 use bevy_ecs::prelude::*;
+use bevy_marchless::marchless::Region;
 use bevy_marchless::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_transform::components::Transform;
@@ -103,7 +104,7 @@ fn a_chunk_may_come_back_while_its_edit_is_meshed() {
     let viewer = app.world_mut().spawn((TerrainViewer::new(24.0).with_margin(0.0), Transform::default())).id();
     settle(&mut app, terrain);
     *app.world_mut().resource_mut::<MarchlessSettings>() =
-        MarchlessSettings { inline_chunks: 0, budget: Some(0), ..Default::default() };
+        MarchlessSettings { max_inline_chunks: 0, max_jobs_per_update: Some(0), ..Default::default() };
     app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::new(4.0, 0.0, 4.0), 3.0)));
     app.update();
     let key = IVec3::ZERO;
@@ -129,7 +130,7 @@ fn edits_in_a_bounded_chunk_survive_the_job_that_was_asked_for_their_sake() {
     let terrain = app.world_mut().spawn(world()).id();
     let viewer = app.world_mut().spawn((TerrainViewer::new(8.0).with_margin(0.0), Transform::default())).id();
     settle(&mut app, terrain);
-    app.world_mut().resource_mut::<MarchlessSettings>().budget = Some(0);
+    app.world_mut().resource_mut::<MarchlessSettings>().max_jobs_per_update = Some(0);
     let at = Vec3::new(1_004.0, -200.0, 4.0);
     for i in 0..70 {
         app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(at, 1.0 + 0.02 * i as f32)));
@@ -139,7 +140,7 @@ fn edits_in_a_bounded_chunk_survive_the_job_that_was_asked_for_their_sake() {
     let point = [1_004, -200, 4];
     move_to(&mut app, viewer, at);
     app.update();
-    app.world_mut().resource_mut::<MarchlessSettings>().budget = None;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_jobs_per_update = None;
     update_until(&mut app, |app| {
         volume(app, terrain).grid().get(point).weight > 0
             && volume(app, terrain).grid().chunk(volume(app, terrain).grid().chunk_of(point)).is_some()
@@ -158,7 +159,7 @@ fn edits_in_a_bounded_chunk_survive_the_job_that_was_asked_for_their_sake() {
 #[test]
 fn the_main_thread_may_take_all_the_time_there_is() {
     let mut app = app();
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::MAX;
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::MAX;
     let terrain = app.world_mut().spawn(world()).id();
     app.world_mut().spawn((TerrainViewer::new(24.0), Transform::default()));
     settle(&mut app, terrain);
@@ -185,7 +186,7 @@ fn flat_worlds_drop_samples_too() {
 fn edits_show_beside_neighbours_that_went() {
     for away in 1..24 {
         let mut app = app();
-        app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::ZERO;
+        app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::ZERO;
         let terrain = app.world_mut().spawn(world()).id();
         let viewer = TerrainViewer::new(32.0).with_margin(16.0);
         let viewer = app.world_mut().spawn((viewer, Transform::default())).id();

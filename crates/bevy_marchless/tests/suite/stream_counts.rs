@@ -9,6 +9,8 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 
@@ -20,7 +22,7 @@ const RADIUS: f32 = 128.0;
 /// Hills without end, and a viewer above them.
 fn hills() -> (App, Entity, Entity) {
     let mut app = app_with_budget(BUDGET);
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_secs(5);
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
     let terrain = app.world_mut().spawn(Terrain::endless(NoiseHeights::default())).id();
     let viewer = app.world_mut().spawn((TerrainViewer::new(RADIUS), Transform::from_xyz(0.0, 70.0, 0.0))).id();
     (app, terrain, viewer)
@@ -101,7 +103,7 @@ fn a_flight_loads_what_comes_into_range_and_little_more() {
 /// How many chunks have been sampled, and for how many of them that was in vain: all that their meshes read lies on one side.
 fn sampled_chunks(volume: &TerrainVolume) -> (usize, usize) {
     let grid = volume.grid();
-    let is_sampled = |chunk: &marchless::Chunk<i16>| matches!(chunk, marchless::Chunk::Samples(_));
+    let is_sampled = |chunk: &marchless::GridChunk<i16>| matches!(chunk, marchless::GridChunk::Samples(_));
     let sampled = grid.chunks().filter(|(_, chunk)| is_sampled(chunk));
     let in_vain = |position: &[i32; 3]| {
         let block = grid.chunk_region(*position).grown(1, 2);

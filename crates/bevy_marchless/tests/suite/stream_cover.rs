@@ -6,6 +6,8 @@ use crate::common::stream::*;
 use crate::common::*;
 use bevy_app::App;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
+use bevy_marchless::stream::Coverage;
 use bevy_math::{IVec3, Quat, Vec3};
 use bevy_transform::components::Transform;
 use proptest::prelude::*;
@@ -18,7 +20,7 @@ fn hills() -> Terrain {
 /// An app that works on the main thread alone, so many jobs an update, and takes the time it needs to load and unload.
 fn patient_app(budget: usize) -> App {
     let mut app = app_with_budget(budget);
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_secs(5);
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
     app
 }
 
@@ -105,7 +107,7 @@ fn the_cover_is_whole_while_threads_work() {
     for seed in 1..=3 {
         println!("seed {seed}");
         let mut app = app();
-        app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_secs(5);
+        app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
         let mut flight = Flight::new(app, hills(), Transform::IDENTITY);
         flight.pause = Duration::from_micros(200);
         fly(flight, legs_of_seed(seed).take(60));
@@ -118,7 +120,7 @@ fn the_cover_is_whole_with_hardly_any_time() {
     for seed in 4..=5 {
         println!("seed {seed}");
         let mut app = app_with_budget(8);
-        app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::ZERO;
+        app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::ZERO;
         let mut flight = Flight::new(app, hills(), Transform::IDENTITY);
         flight.lags = true;
         fly(flight, legs_of_seed(seed).take(40));
@@ -130,7 +132,7 @@ fn few_chunks_in_flight_and_few_bytes_an_update_only_take_longer() {
     println!("seed 6");
     let mut app = patient_app(8);
     let mut settings = app.world_mut().resource_mut::<MarchlessSettings>();
-    (settings.chunks_in_flight, settings.upload_bytes, settings.inline_chunks) = (1, 1, 1);
+    (settings.max_chunks_in_flight, settings.max_upload_bytes, settings.max_inline_chunks) = (1, 1, 1);
     fly(Flight::new(app, hills(), Transform::IDENTITY), legs_of_seed(6).take(30));
 }
 

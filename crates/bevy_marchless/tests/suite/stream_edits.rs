@@ -7,12 +7,14 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::message::{MessageCursor, Messages};
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
+use bevy_marchless::stream::{Leaf, LeafState};
 use bevy_math::{IVec3, Vec3};
 use bevy_transform::components::Transform;
 
 fn patient_app() -> App {
     let mut app = app_with_budget(16);
-    app.world_mut().resource_mut::<MarchlessSettings>().main_thread = Duration::from_secs(5);
+    app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
     app
 }
 
@@ -208,7 +210,7 @@ fn an_edit_shows_in_the_update_that_reads_it_while_others_load() {
     let mut flight = flight();
     // In chunks this small even a small stamp touches many.
     let mut settings = flight.app.world_mut().resource_mut::<MarchlessSettings>();
-    (settings.budget, settings.inline_chunks) = (Some(1), 27);
+    (settings.max_jobs_per_update, settings.max_inline_chunks) = (Some(1), 27);
     let viewer = flight.viewers[0];
     let far = Vec3::new(20.0, 0.0, 0.0);
     flight.place(viewer, far);

@@ -6,6 +6,8 @@ use crate::common::*;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
+use bevy_marchless::stream::LeafState;
 use bevy_math::{IVec3, Vec3};
 use bevy_transform::components::Transform;
 
@@ -51,9 +53,9 @@ fn no_leaf_waits_behind_a_walk() {
     for (name, step) in
         [("east", Vec3::X), ("north-west", Vec3::new(-0.6, 0.0, -0.8)), ("south-east and up", Vec3::new(0.7, 0.1, 0.7))]
     {
-        for main_thread in SHARES {
+        for streaming_budget in SHARES {
             let (mut app, terrain, viewer) = hills();
-            app.world_mut().resource_mut::<MarchlessSettings>().main_thread = main_thread;
+            app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = streaming_budget;
             let mut place = Vec3::new(0.0, 60.0, 0.0);
             for _ in 0..100 {
                 place += 12.0 * step;
@@ -67,9 +69,9 @@ fn no_leaf_waits_behind_a_walk() {
 
 #[test]
 fn no_leaf_waits_after_going_to_and_fro() {
-    for main_thread in SHARES {
+    for streaming_budget in SHARES {
         let (mut app, terrain, viewer) = hills();
-        app.world_mut().resource_mut::<MarchlessSettings>().main_thread = main_thread;
+        app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = streaming_budget;
         for update in 0..120u8 {
             let x = if update % 24 < 12 { update % 24 } else { 24 - update % 24 };
             move_to(&mut app, viewer, Vec3::new(9.0 * f32::from(x), 60.0, 0.0));

@@ -9,6 +9,7 @@ use crate::common::stream::*;
 use crate::common::*;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stats::TerrainStats;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 

@@ -35,7 +35,7 @@ fn a_stroke_shows_in_every_update() {
 #[test]
 fn a_stroke_too_large_for_one_update_makes_progress_while_it_lasts() {
     let mut app = app_with_budget(3);
-    app.world_mut().resource_mut::<MarchlessSettings>().inline_chunks = 0;
+    app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let terrain = settled(&mut app, ground());
     let mut shown = 0;
     for step in 0..60 {

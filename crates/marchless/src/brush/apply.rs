@@ -1,8 +1,8 @@
 //! Applying stamps to chunks and grids.
 
-use super::{Edit, Stamp, change::Change};
+use super::{Edit, QuantisedStamp, change::Change};
 use crate::{
-    grid::{Chunk, Grid, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples, border::Border},
+    grid::{Grid, GridChunk, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SamplePool, border::Border},
     lattice::Region,
     sample::Voxel,
 };
@@ -11,7 +11,7 @@ impl Grid<i16> {
     /// Applies `stamp` to all the chunks it touches, absent ones (air) included, and marks dirty what has changed. In a
     /// bounded grid nothing changes outside the bounds, and samples on the outermost planes, which no surface has inside, do
     /// not count as volume.
-    pub fn apply(&mut self, stamp: &Stamp) -> Edit {
+    pub fn apply(&mut self, stamp: &QuantisedStamp) -> Edit {
         let mut edit = Edit::NONE;
         let touched = stamp.region();
         if touched.is_empty() {
@@ -19,9 +19,9 @@ impl Grid<i16> {
         }
         let last = touched.max.map(|v| v - 1);
         let chunks = Region::new(self.chunk_of(touched.min), self.chunk_of(last).map(|v| v + 1));
-        let mut spare = SpareSamples::new();
+        let mut pool = SamplePool::new();
         for position in self.bounds().map_or(chunks, |bounds| bounds.intersection(&chunks)).points() {
-            edit.merge(&self.apply_to_chunk(position, stamp, &mut spare));
+            edit.merge(&self.apply_to_chunk(position, stamp, &mut pool));
         }
         edit
     }
@@ -31,17 +31,18 @@ impl Grid<i16> {
     /// edit has no volume.
     ///
     /// Applied to every chunk, each in its own time but with the stamps in the same order, it gives the same samples as
-    /// [`Grid::apply`]. `spare`: memory for a copy of the samples, which is made where clones of the chunk are there.
-    pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &Stamp, spare: &mut SpareSamples) -> Edit {
+    /// [`Grid::apply`]. `pool`: memory for a copy of the samples, which is made where clones of the chunk are there.
+    #[doc(hidden)]
+    pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &QuantisedStamp, pool: &mut SamplePool) -> Edit {
         let (cells, planes, origin) = (self.chunk_cells(), self.planes(), self.chunk_region(position).min);
         if let Some(chunk) = self.present_chunk_mut(position) {
-            let edit = chunk.change(origin, cells, planes, stamp, spare);
+            let edit = chunk.change(origin, cells, planes, stamp, pool);
             self.mark_dirty(edit.region);
             return edit;
         }
-        let mut chunk = Chunk::AIR;
-        let edit = chunk.change(origin, cells, planes, stamp, spare);
-        if edit.is_empty() || self.check(position).and_then(|()| self.load(position, chunk)).is_err() {
+        let mut chunk = GridChunk::AIR;
+        let edit = chunk.change(origin, cells, planes, stamp, pool);
+        if edit.is_empty() || self.check(position).and_then(|()| self.insert_clean(position, chunk)).is_err() {
             return Edit::NONE;
         }
         self.mark_dirty(edit.region);
@@ -49,15 +50,21 @@ impl Grid<i16> {
     }
 }
 
-impl Chunk<i16> {
+impl GridChunk<i16> {
     /// Applies `stamp` to the samples of the chunk. A uniform chunk stays uniform where all of it changes alike, and
     /// samples are written out or copied only where some of them change.
     ///
     /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes
     /// of a bounded grid ([`Grid::planes`]), on and beyond which samples do not count as volume. Nothing changes in a chunk
     /// whose samples are not `cells³`, or where no chunk has so many.
-    pub fn apply_stamp(&mut self, origin: [i32; 3], cells: u32, planes: Option<Region>, stamp: &Stamp) -> Edit {
-        self.change(origin, cells, planes, stamp, &mut SpareSamples::new())
+    pub fn apply_stamp(
+        &mut self,
+        origin: [i32; 3],
+        cells: u32,
+        planes: Option<Region>,
+        stamp: &QuantisedStamp,
+    ) -> Edit {
+        self.change(origin, cells, planes, stamp, &mut SamplePool::new())
     }
 
     fn change(
@@ -65,8 +72,8 @@ impl Chunk<i16> {
         origin: [i32; 3],
         cells: u32,
         planes: Option<Region>,
-        stamp: &Stamp,
-        spare: &mut SpareSamples,
+        stamp: &QuantisedStamp,
+        pool: &mut SamplePool,
     ) -> Edit {
         let chunk = Region::new(origin, origin.map(|v| v.saturating_add_unsigned(cells)));
         let area = chunk.intersection(&stamp.region());
@@ -88,7 +95,7 @@ impl Chunk<i16> {
             }
             return edit;
         }
-        pass.run(self, spare)
+        pass.run(self, pool)
     }
 }
 
@@ -124,7 +131,7 @@ impl Pass {
     }
 
     /// Applies the change sample by sample.
-    fn run(&self, chunk: &mut Chunk<i16>, spare: &mut SpareSamples) -> Edit {
+    fn run(&self, chunk: &mut GridChunk<i16>, pool: &mut SamplePool) -> Edit {
         let mut edit = Edit::NONE;
         let xs = self.area.min[0]..self.area.max[0];
         let [_, ny, nz] = self.area.size();
@@ -136,7 +143,7 @@ impl Pass {
             })
         });
         let Some(first_changed) = first_changed else { return edit };
-        let samples = chunk.samples_mut(self.cells, spare);
+        let samples = chunk.samples_mut(self.cells, pool);
         for row in first_changed..ny * nz {
             let ([y, z], start) = self.row(row);
             let mut changed = None;

@@ -1,16 +1,16 @@
 //! [`Change`]: what a stamp does to one sample.
 
-use super::{BrushShape, EDIT_LIMIT, Operation, Stamp, Stroke, shape::UNITS};
+use super::{EDIT_LIMIT, Operation, QuantisedShape, QuantisedStamp, QuantisedStroke, shape::UNITS};
 use crate::{lattice::Region, sample::Voxel};
 
 /// A stamp made ready to be applied sample by sample.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
     /// Limited.
-    shape: BrushShape,
+    shape: QuantisedShape,
     operation: Operation,
     material: u8,
-    stroke: Option<Stroke>,
+    stroke: Option<QuantisedStroke>,
     /// The least weight that is not solid.
     isovalue: i16,
     /// The range of distances within which they make a difference.
@@ -19,9 +19,9 @@ pub(super) struct Change {
 }
 
 impl Change {
-    pub(super) fn new(stamp: &Stamp) -> Self {
-        let Stamp { operation, material, stroke, .. } = *stamp;
-        let isovalue = stamp.isovalue.clamp(-Stamp::MAX_ISOVALUE, Stamp::MAX_ISOVALUE);
+    pub(super) fn new(stamp: &QuantisedStamp) -> Self {
+        let QuantisedStamp { operation, material, stroke, .. } = *stamp;
+        let isovalue = stamp.isovalue.clamp(-QuantisedStamp::MAX_ISOVALUE, QuantisedStamp::MAX_ISOVALUE);
         let low = match (operation, &stroke) {
             (Operation::Paint, _) => -1,
             (_, Some(stroke)) => -rim(stroke),
@@ -98,13 +98,13 @@ impl Change {
 }
 
 /// How deep inside the shape a stroke's full rate begins; never 0.
-fn rim(stroke: &Stroke) -> i32 {
+fn rim(stroke: &QuantisedStroke) -> i32 {
     stroke.falloff.clamp(1, i32::MAX as u32) as i32
 }
 
 /// How far a weight moves in a stroke's time, at a distance from minus the rim to 0. Moves of twice [`EDIT_LIMIT`]
 /// are as good as longer ones.
-fn moved(stroke: &Stroke, distance: i32) -> i32 {
+fn moved(stroke: &QuantisedStroke, distance: i32) -> i32 {
     let rate = u128::from(stroke.rate) * u128::from(distance.unsigned_abs());
     let second = u128::from(rim(stroke).unsigned_abs()) * 1_000_000;
     // Less than 2³² · 2³¹ · 2⁶⁴.

@@ -1,4 +1,4 @@
-//! [`BrushShape`]: quantised shapes and their signed distances, in integers.
+//! [`QuantisedShape`]: quantised shapes and their signed distances, in integers.
 
 use super::BrushError;
 use crate::{lattice::Region, math::sqrt_f64};
@@ -19,7 +19,7 @@ const LENGTH_LIMIT: i64 = 1 << 19;
 /// The constructors quantise voxels and check limits. Numbers beyond the limits, in a shape put together by
 /// hand, count as the nearest within them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum BrushShape {
+pub enum QuantisedShape {
     /// All points less than `radius` from `center`.
     Sphere {
         /// The middle.
@@ -45,7 +45,7 @@ pub enum BrushShape {
     },
 }
 
-impl BrushShape {
+impl QuantisedShape {
     /// The largest coordinate, either way, in voxels.
     pub const MAX_POSITION: f64 = (POSITION_LIMIT / UNITS as i64) as f64;
     /// The largest radius and half size, in voxels.
@@ -154,7 +154,7 @@ pub(super) fn units(voxels: f64) -> i64 {
 }
 
 fn position(voxels: [f64; 3]) -> Result<[i64; 3], BrushError> {
-    let limits = -BrushShape::MAX_POSITION..=BrushShape::MAX_POSITION;
+    let limits = -QuantisedShape::MAX_POSITION..=QuantisedShape::MAX_POSITION;
     match voxels.iter().find(|v| !limits.contains(v)) {
         Some(&found) => Err(BrushError::Position { found }),
         None => Ok(voxels.map(units)),
@@ -162,7 +162,7 @@ fn position(voxels: [f64; 3]) -> Result<[i64; 3], BrushError> {
 }
 
 fn size(name: &'static str, voxels: f64) -> Result<u32, BrushError> {
-    if voxels > 0.0 && voxels <= BrushShape::MAX_RADIUS {
+    if voxels > 0.0 && voxels <= QuantisedShape::MAX_RADIUS {
         Ok((units(voxels) as u32).max(1))
     } else {
         Err(BrushError::Size { name, found: voxels })

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    grid::{Chunk, Grid, SpareSamples},
+    grid::{Grid, GridChunk, SamplePool},
     sample::{Voxel, Weight as _},
 };
 
@@ -26,9 +26,9 @@ fn grid(seed: u64, bounded: bool) -> Grid<i16> {
     let mut state = seed | 1;
     for (number, position) in BOUNDS.points().enumerate() {
         let chunk = match (number as u64 + seed) % 4 {
-            0 => Chunk::Uniform(Voxel::new(-3000, 7)),
+            0 => GridChunk::Uniform(Voxel::new(-3000, 7)),
             1 if !bounded => continue,
-            1 => Chunk::AIR,
+            1 => GridChunk::AIR,
             _ => {
                 let mut next = || {
                     state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -36,7 +36,7 @@ fn grid(seed: u64, bounded: bool) -> Grid<i16> {
                 };
                 let weights = (0..CELLS.pow(3)).map(|_| (next() % 3000) as i16 - 1500).collect();
                 let materials = (0..CELLS.pow(3)).map(|_| (next() % 3) as u8).collect();
-                Chunk::from_samples(weights, materials, CELLS).unwrap()
+                GridChunk::from_samples(weights, materials, CELLS).unwrap()
             }
         };
         grid.insert(position, chunk).unwrap();
@@ -53,12 +53,12 @@ prop_compose! {
     fn small_position()(p in prop::array::uniform3(-20 * 256i64..28 * 256)) -> [i64; 3] { p }
 }
 
-fn small_shape() -> impl Strategy<Value = BrushShape> {
+fn small_shape() -> impl Strategy<Value = QuantisedShape> {
     prop_oneof![
-        (small_position(), 1u32..12 * 256).prop_map(|(center, radius)| BrushShape::Sphere { center, radius }),
+        (small_position(), 1u32..12 * 256).prop_map(|(center, radius)| QuantisedShape::Sphere { center, radius }),
         (small_position(), prop::array::uniform3(1u32..12 * 256))
-            .prop_map(|(center, half_size)| BrushShape::Box { center, half_size }),
-        (small_position(), small_position(), 1u32..8 * 256).prop_map(|(a, b, radius)| BrushShape::Capsule {
+            .prop_map(|(center, half_size)| QuantisedShape::Box { center, half_size }),
+        (small_position(), small_position(), 1u32..8 * 256).prop_map(|(a, b, radius)| QuantisedShape::Capsule {
             a,
             b,
             radius
@@ -66,15 +66,15 @@ fn small_shape() -> impl Strategy<Value = BrushShape> {
     ]
 }
 
-fn any_shape() -> impl Strategy<Value = BrushShape> {
+fn any_shape() -> impl Strategy<Value = QuantisedShape> {
     let number = || prop_oneof![Just(i64::MIN), Just(i64::MAX), any::<i64>(), -100_000i64..100_000];
     let position = move || prop::array::uniform3(number());
     let size = || prop_oneof![Just(0), Just(u32::MAX), any::<u32>(), 0u32..10_000];
     prop_oneof![
-        (position(), size()).prop_map(|(center, radius)| BrushShape::Sphere { center, radius }),
+        (position(), size()).prop_map(|(center, radius)| QuantisedShape::Sphere { center, radius }),
         (position(), prop::array::uniform3(size()))
-            .prop_map(|(center, half_size)| BrushShape::Box { center, half_size }),
-        (position(), position(), size()).prop_map(|(a, b, radius)| BrushShape::Capsule { a, b, radius }),
+            .prop_map(|(center, half_size)| QuantisedShape::Box { center, half_size }),
+        (position(), position(), size()).prop_map(|(a, b, radius)| QuantisedShape::Capsule { a, b, radius }),
     ]
 }
 
@@ -82,36 +82,38 @@ fn operation() -> impl Strategy<Value = Operation> {
     prop_oneof![Just(Operation::Add), Just(Operation::Dig), Just(Operation::Paint)]
 }
 
-fn stroke() -> impl Strategy<Value = Stroke> {
-    (0u32..20_000, 0u32..2000, 0u64..1_000_000, 0u64..1_000_000).prop_map(|(rate, falloff, start_us, span)| Stroke {
-        id: 1,
-        rate,
-        falloff,
-        start_us,
-        end_us: start_us + span,
+fn stroke() -> impl Strategy<Value = QuantisedStroke> {
+    (0u32..20_000, 0u32..2000, 0u64..1_000_000, 0u64..1_000_000).prop_map(|(rate, falloff, start_us, span)| {
+        QuantisedStroke { id: 1, rate, falloff, start_us, end_us: start_us + span }
     })
 }
 
-fn stamp() -> impl Strategy<Value = Stamp> {
+fn stamp() -> impl Strategy<Value = QuantisedStamp> {
     let isovalue = prop_oneof![3 => Just(0), 3 => -700..700i16, 1 => any::<i16>()];
     (small_shape(), operation(), 0u8..5, prop::option::of(stroke()), isovalue).prop_map(
-        |(shape, operation, material, stroke, isovalue)| Stamp { shape, operation, material, stroke, isovalue },
+        |(shape, operation, material, stroke, isovalue)| QuantisedStamp {
+            shape,
+            operation,
+            material,
+            stroke,
+            isovalue,
+        },
     )
 }
 
 /// The distance as a textbook has it, in units.
-fn distance_oracle(shape: &BrushShape, point: [i32; 3]) -> f64 {
+fn distance_oracle(shape: &QuantisedShape, point: [i32; 3]) -> f64 {
     let from = |p: [i64; 3]| [0, 1, 2].map(|i| f64::from(point[i]) * 256.0 - p[i] as f64);
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let length = |a: [f64; 3]| dot(a, a).sqrt();
     match *shape {
-        BrushShape::Sphere { center, radius } => length(from(center)) - f64::from(radius),
-        BrushShape::Box { center, half_size } => {
+        QuantisedShape::Sphere { center, radius } => length(from(center)) - f64::from(radius),
+        QuantisedShape::Box { center, half_size } => {
             let offset = from(center);
             let q = [0, 1, 2].map(|i| offset[i].abs() - f64::from(half_size[i]));
             length(q.map(|v| v.max(0.0))) + q[0].max(q[1]).max(q[2]).min(0.0)
         }
-        BrushShape::Capsule { a, b, radius } => {
+        QuantisedShape::Capsule { a, b, radius } => {
             let (from_a, along) = (from(a), [0, 1, 2].map(|i| (b[i] - a[i]) as f64));
             let t = if a == b { 0.0 } else { (dot(from_a, along) / dot(along, along)).clamp(0.0, 1.0) };
             length([0, 1, 2].map(|i| from_a[i] - along[i] * t)) - f64::from(radius)
@@ -120,7 +122,7 @@ fn distance_oracle(shape: &BrushShape, point: [i32; 3]) -> f64 {
 }
 
 /// What a stamp makes of a sample, straight from its definition.
-fn change_oracle(stamp: &Stamp, old: Voxel, point: [i32; 3]) -> Voxel {
+fn change_oracle(stamp: &QuantisedStamp, old: Voxel, point: [i32; 3]) -> Voxel {
     let distance = stamp.shape.distance(point);
     let isovalue = i32::from(stamp.isovalue).clamp(-31_743, 31_743);
     let from_surface = i32::from(old.weight) - isovalue;
@@ -180,9 +182,9 @@ proptest! {
         let near = [0, 1, 2].map(|i| (center[i] / 256) as i32 + step[i]);
         let b = [0, 1, 2].map(|i| (center[i] + length[i]).clamp(-(1 << 38), 1 << 38));
         for shape in [
-            BrushShape::Sphere { center, radius },
-            BrushShape::Box { center, half_size: [radius, 100, radius] },
-            BrushShape::Capsule { a: center, b, radius },
+            QuantisedShape::Sphere { center, radius },
+            QuantisedShape::Box { center, half_size: [radius, 100, radius] },
+            QuantisedShape::Capsule { a: center, b, radius },
         ] {
             for point in [near, points[0], points[1]] {
                 let (found, exact) = (f64::from(shape.distance(point)), distance_oracle(&shape, point));
@@ -208,7 +210,7 @@ proptest! {
                 near = near.union(&Region::new(point, point.map(|v| v + 1)));
             }
         }
-        if let BrushShape::Box { .. } = shape && margin == 0 && !near.is_empty() {
+        if let QuantisedShape::Box { .. } = shape && margin == 0 && !near.is_empty() {
             prop_assert_eq!(near, region);
         }
     }
@@ -270,7 +272,7 @@ proptest! {
             let Voxel { weight, material } = low.get(point);
             high.set(point, Voxel::new(weight.saturating_add(isovalue), material)).unwrap();
         }
-        let edits = [low.apply(&Stamp { isovalue: 0, ..stamp }), high.apply(&Stamp { isovalue, ..stamp })];
+        let edits = [low.apply(&QuantisedStamp { isovalue: 0, ..stamp }), high.apply(&QuantisedStamp { isovalue, ..stamp })];
         for point in all_points().filter(|point| low.chunk(low.chunk_of(*point)).is_some()) {
             let (low, high) = (low.get(point), high.get(point));
             prop_assert!(low.weight == i16::MAX || low.weight + isovalue == high.weight, "at {point:?}: {low:?}, {high:?}");
@@ -300,7 +302,7 @@ proptest! {
         let mut edit_in_turns = Edit::NONE;
         for chunk in turns.into_iter().chain((0..8).flat_map(|chunk| vec![chunk; stamps.len()])) {
             if let Some(stamp) = stamps.get(done[chunk]) {
-                edit_in_turns.merge(&in_turns.apply_to_chunk(positions[chunk], stamp, &mut SpareSamples::new()));
+                edit_in_turns.merge(&in_turns.apply_to_chunk(positions[chunk], stamp, &mut SamplePool::new()));
                 done[chunk] += 1;
             }
         }
@@ -321,14 +323,14 @@ proptest! {
         cuts in prop::collection::vec(0u64..2_000_000, 0..12),
     ) {
         let (mut whole, mut cut) = (grid(seed, bounded), grid(seed, bounded));
-        let stamp = Stamp::new(shape, if dig { Operation::Dig } else { Operation::Add }, 9);
+        let stamp = QuantisedStamp::new(shape, if dig { Operation::Dig } else { Operation::Add }, 9);
         let expected = whole.apply(&stamp.with_stroke(stroke));
         let mut times = cuts.iter().map(|cut| (*cut).clamp(stroke.start_us, stroke.end_us)).collect::<Vec<_>>();
         times.extend([stroke.start_us, stroke.end_us]);
         times.sort_unstable();
         let mut edit = Edit::NONE;
         for part in times.windows(2) {
-            edit.merge(&cut.apply(&stamp.with_stroke(Stroke { start_us: part[0], end_us: part[1], ..stroke })));
+            edit.merge(&cut.apply(&stamp.with_stroke(QuantisedStroke { start_us: part[0], end_us: part[1], ..stroke })));
         }
         prop_assert_eq!(read(&whole), read(&cut));
         prop_assert_eq!(expected, edit);
@@ -337,10 +339,10 @@ proptest! {
     #[test]
     fn eight_voxels_of_change_turn_everything(seed: u64, shape in small_shape()) {
         let mut grid = grid(seed, false);
-        let stroke = Stroke { id: 1, rate: 8 * 256, falloff: 0, start_us: 0, end_us: 1_000_000 };
+        let stroke = QuantisedStroke { id: 1, rate: 8 * 256, falloff: 0, start_us: 0, end_us: 1_000_000 };
         let inside = all_points().filter(|point| shape.distance(*point) < 0).collect::<Vec<_>>();
         for (operation, expected) in [(Operation::Dig, 1024), (Operation::Add, -1024), (Operation::Dig, 1024)] {
-            grid.apply(&Stamp::new(shape, operation, 5).with_stroke(stroke));
+            grid.apply(&QuantisedStamp::new(shape, operation, 5).with_stroke(stroke));
             for &point in &inside {
                 let weight = i32::from(grid.get(point).weight);
                 prop_assert!(weight == expected || weight.abs() > 1024 && weight.signum() == expected.signum());
@@ -362,12 +364,12 @@ proptest! {
         isovalue: i16,
         point in prop::array::uniform3(prop_oneof![Just(i32::MIN), Just(i32::MAX), any::<i32>()]),
     ) {
-        let stroke = stroke.map(|(rate, falloff, start_us, end_us)| Stroke { id: 0, rate, falloff, start_us, end_us });
-        let stamp = Stamp { shape, operation, material: 1, stroke, isovalue };
+        let stroke = stroke.map(|(rate, falloff, start_us, end_us)| QuantisedStroke { id: 0, rate, falloff, start_us, end_us });
+        let stamp = QuantisedStamp { shape, operation, material: 1, stroke, isovalue };
         let mut grid = grid(seed, true);
         grid.apply(&stamp);
         stamp.shape.distance(point);
-        let whole = Chunk::Uniform(Voxel::new(-1, 0));
+        let whole = GridChunk::Uniform(Voxel::new(-1, 0));
         for cells in [0, CELLS, 62, 63, u32::MAX] {
             for planes in [None, Some(stamp.region()), Some(Region::new([i32::MAX; 3], [i32::MIN; 3]))] {
                 whole.clone().apply_stamp(point, cells, planes, &stamp);
@@ -379,23 +381,23 @@ proptest! {
 
 #[test]
 fn uniform_chunks_stay_uniform_where_they_can() {
-    let solid = Chunk::Uniform(Voxel::new(i16::MIN, 3));
-    let everything = BrushShape::sphere([4.0; 3], 100.0).unwrap();
-    let dig = Stamp::new(everything, Operation::Dig, 0);
+    let solid = GridChunk::Uniform(Voxel::new(i16::MIN, 3));
+    let everything = QuantisedShape::sphere([4.0; 3], 100.0).unwrap();
+    let dig = QuantisedStamp::new(everything, Operation::Dig, 0);
 
     let mut chunk = solid.clone();
     let edit = chunk.apply_stamp([0; 3], 8, None, &dig);
-    assert_eq!(chunk, Chunk::Uniform(Voxel::new(EDIT_LIMIT, 3)));
+    assert_eq!(chunk, GridChunk::Uniform(Voxel::new(EDIT_LIMIT, 3)));
     assert_eq!((edit.region, edit.removed.get(3)), (Region::new([0; 3], [8; 3]), 512));
     assert!(chunk.apply_stamp([0; 3], 8, None, &dig).is_empty());
-    let edit = chunk.apply_stamp([0; 3], 8, None, &Stamp::new(everything, Operation::Add, 4));
-    assert_eq!(chunk, Chunk::Uniform(Voxel::new(-EDIT_LIMIT, 4)));
+    let edit = chunk.apply_stamp([0; 3], 8, None, &QuantisedStamp::new(everything, Operation::Add, 4));
+    assert_eq!(chunk, GridChunk::Uniform(Voxel::new(-EDIT_LIMIT, 4)));
     assert_eq!(edit.added.get(4), 512);
 
-    let mut air = Chunk::AIR;
-    let partly = Stamp::new(BrushShape::sphere([0.0; 3], 3.0).unwrap(), Operation::Dig, 0);
+    let mut air = GridChunk::AIR;
+    let partly = QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 3.0).unwrap(), Operation::Dig, 0);
     assert!(air.apply_stamp([0; 3], 8, None, &partly).is_empty());
-    assert_eq!(air, Chunk::AIR);
+    assert_eq!(air, GridChunk::AIR);
 
     let mut grid = Grid::<i16>::new(8).unwrap();
     assert!(grid.apply(&partly).is_empty());
@@ -405,16 +407,16 @@ fn uniform_chunks_stay_uniform_where_they_can() {
 #[test]
 fn samples_are_shared_until_one_changes() {
     let weights = (0..512).map(|v| v - 256).collect();
-    let original = Chunk::from_samples(weights, vec![1; 512], 8).unwrap();
-    let shares = |chunk: &Chunk| match (chunk, &original) {
-        (Chunk::Samples(a), Chunk::Samples(b)) => Arc::ptr_eq(a, b),
+    let original = GridChunk::from_samples(weights, vec![1; 512], 8).unwrap();
+    let shares = |chunk: &GridChunk| match (chunk, &original) {
+        (GridChunk::Samples(a), GridChunk::Samples(b)) => Arc::ptr_eq(a, b),
         _ => false,
     };
     let mut chunk = original.clone();
-    let shape = BrushShape::sphere([4.0; 3], 2.0).unwrap();
-    assert!(chunk.apply_stamp([0; 3], 8, None, &Stamp::new(shape, Operation::Paint, 1)).is_empty());
+    let shape = QuantisedShape::sphere([4.0; 3], 2.0).unwrap();
+    assert!(chunk.apply_stamp([0; 3], 8, None, &QuantisedStamp::new(shape, Operation::Paint, 1)).is_empty());
     assert!(shares(&chunk));
-    assert!(!chunk.apply_stamp([0; 3], 8, None, &Stamp::new(shape, Operation::Paint, 2)).is_empty());
+    assert!(!chunk.apply_stamp([0; 3], 8, None, &QuantisedStamp::new(shape, Operation::Paint, 2)).is_empty());
     assert!(!shares(&chunk));
 }
 
@@ -422,9 +424,9 @@ fn samples_are_shared_until_one_changes() {
 fn a_dug_ball_is_as_large_as_a_ball() {
     let mut grid = Grid::<i16>::new(32).unwrap();
     for position in Region::new([-1; 3], [1; 3]).points() {
-        grid.insert(position, Chunk::Uniform(Voxel::new(i16::MIN, 2))).unwrap();
+        grid.insert(position, GridChunk::Uniform(Voxel::new(i16::MIN, 2))).unwrap();
     }
-    let edit = grid.apply(&Stamp::new(BrushShape::sphere([0.0; 3], 10.0).unwrap(), Operation::Dig, 0));
+    let edit = grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 10.0).unwrap(), Operation::Dig, 0));
     let exact = Region::new([-10; 3], [11; 3]).points().filter(|p| p.iter().map(|v| v * v).sum::<i32>() <= 100);
     assert_eq!(edit.removed.get(2), exact.count() as u64);
     assert_eq!((edit.removed.total(), edit.added.total()), (edit.removed.get(2), 0));
@@ -434,42 +436,42 @@ fn a_dug_ball_is_as_large_as_a_ball() {
 
 #[test]
 fn constructors_round_to_the_nearest_step() {
-    let shape = BrushShape::capsule([0.5, -0.5, 1.0 / 300.0], [-1.0 / 600.0, 7.0, 0.0], 1e-9).unwrap();
-    assert_eq!(shape, BrushShape::Capsule { a: [128, -128, 1], b: [0, 1792, 0], radius: 1 });
-    let stroke = Stroke::new(7, 1.5, 0.0, Duration::from_nanos(1999), Duration::MAX).unwrap();
-    assert_eq!(stroke, Stroke { id: 7, rate: 384, falloff: 0, start_us: 1, end_us: u64::MAX });
+    let shape = QuantisedShape::capsule([0.5, -0.5, 1.0 / 300.0], [-1.0 / 600.0, 7.0, 0.0], 1e-9).unwrap();
+    assert_eq!(shape, QuantisedShape::Capsule { a: [128, -128, 1], b: [0, 1792, 0], radius: 1 });
+    let stroke = QuantisedStroke::new(7, 1.5, 0.0, Duration::from_nanos(1999), Duration::MAX).unwrap();
+    assert_eq!(stroke, QuantisedStroke { id: 7, rate: 384, falloff: 0, start_us: 1, end_us: u64::MAX });
 }
 
 #[test]
 fn constructors_refuse_bad_numbers_in_a_sentence() {
     let origin = [0.0; 3];
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, -1.0, 1024.1] {
-        assert!(matches!(BrushShape::sphere(origin, bad), Err(BrushError::Size { name: "radius", .. })), "{bad}");
-        assert!(matches!(BrushShape::capsule(origin, origin, bad), Err(BrushError::Size { name: "radius", .. })));
-        let found = BrushShape::cuboid(origin, [1.0, bad, 1.0]);
+        assert!(matches!(QuantisedShape::sphere(origin, bad), Err(BrushError::Size { name: "radius", .. })), "{bad}");
+        assert!(matches!(QuantisedShape::capsule(origin, origin, bad), Err(BrushError::Size { name: "radius", .. })));
+        let found = QuantisedShape::cuboid(origin, [1.0, bad, 1.0]);
         assert!(matches!(found, Err(BrushError::Size { name: "half size", .. })));
     }
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1.1e9, -1.1e9] {
         for position in [[bad, 0.0, 0.0], [0.0, 0.0, bad]] {
-            assert!(matches!(BrushShape::sphere(position, 1.0), Err(BrushError::Position { .. })), "{bad}");
-            assert!(matches!(BrushShape::cuboid(position, [1.0; 3]), Err(BrushError::Position { .. })));
-            assert!(matches!(BrushShape::capsule(origin, position, 1.0), Err(BrushError::Position { .. })));
+            assert!(matches!(QuantisedShape::sphere(position, 1.0), Err(BrushError::Position { .. })), "{bad}");
+            assert!(matches!(QuantisedShape::cuboid(position, [1.0; 3]), Err(BrushError::Position { .. })));
+            assert!(matches!(QuantisedShape::capsule(origin, position, 1.0), Err(BrushError::Position { .. })));
         }
     }
     for bad in [f64::NAN, f64::INFINITY, -1.0, 70_000.0] {
         let (start, end) = (Duration::ZERO, Duration::from_secs(1));
-        assert!(matches!(Stroke::new(0, bad, 1.0, start, end), Err(BrushError::Rate { .. })), "{bad}");
-        assert!(matches!(Stroke::new(0, 1.0, bad, start, end), Err(BrushError::Falloff { .. })), "{bad}");
-        assert!(matches!(Stroke::new(0, 1.0, 1.0, end, start), Err(BrushError::Time { .. })));
+        assert!(matches!(QuantisedStroke::new(0, bad, 1.0, start, end), Err(BrushError::Rate { .. })), "{bad}");
+        assert!(matches!(QuantisedStroke::new(0, 1.0, bad, start, end), Err(BrushError::Falloff { .. })), "{bad}");
+        assert!(matches!(QuantisedStroke::new(0, 1.0, 1.0, end, start), Err(BrushError::Time { .. })));
     }
-    let far = BrushShape::capsule(origin, [0.0, 0.0, 2049.0], 1.0).unwrap_err();
+    let far = QuantisedShape::capsule(origin, [0.0, 0.0, 2049.0], 1.0).unwrap_err();
     assert_eq!(far, BrushError::Length { found: 2049.0 });
     assert_eq!(
-        BrushShape::sphere(origin, f64::NAN).unwrap_err().to_string(),
+        QuantisedShape::sphere(origin, f64::NAN).unwrap_err().to_string(),
         "a brush's radius must be above 0 and at most 1024 voxels, but it is NaN"
     );
     assert_eq!(
-        BrushShape::sphere([f64::INFINITY; 3], 1.0).unwrap_err().to_string(),
+        QuantisedShape::sphere([f64::INFINITY; 3], 1.0).unwrap_err().to_string(),
         "a brush's coordinates must lie within ±1073741824 voxels of the origin, but one is inf"
     );
 }

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::array;
 
 use super::border::{Border, larger, layer_indices};
-use super::{Chunk, DEFAULT_CHUNK_CELLS, MAX_CHUNK_CELLS};
+use super::{DEFAULT_CHUNK_CELLS, GridChunk, MAX_CHUNK_CELLS};
 use crate::buffer::MeshBuffer;
 use crate::lattice::{Samples, Shape};
 use crate::mesher::{MeshError, MeshSettings, Mesher};
@@ -17,7 +17,7 @@ use crate::sample::{Voxel, Weight};
 #[derive(Clone, Debug)]
 pub struct Neighbourhood<W = i16> {
     /// x fastest, the chunk itself in the middle; `None` where there is none.
-    pub(super) chunks: [Option<Chunk<W>>; 27],
+    pub(super) chunks: [Option<GridChunk<W>>; 27],
     /// A bit for each of them: whether it lies beyond the bounds. Within, what is not there is air.
     pub(super) beyond: u32,
     pub(super) cells: u32,
@@ -66,7 +66,7 @@ impl<W: Weight> Neighbourhood<W> {
 #[derive(Clone, Copy, Debug)]
 pub struct NeighbourhoodView<'a, W = i16> {
     /// As in [`Neighbourhood`].
-    pub(super) chunks: [Option<&'a Chunk<W>>; 27],
+    pub(super) chunks: [Option<&'a GridChunk<W>>; 27],
     pub(super) beyond: u32,
     pub(super) cells: u32,
     pub(super) origin: [i64; 3],
@@ -75,7 +75,7 @@ pub struct NeighbourhoodView<'a, W = i16> {
 
 impl<'a, W: Weight> NeighbourhoodView<'a, W> {
     /// The chunks, x fastest, each where there is one; the chunk itself is in the middle.
-    pub const fn chunks(&self) -> &[Option<&'a Chunk<W>>; 27] {
+    pub const fn chunks(&self) -> &[Option<&'a GridChunk<W>>; 27] {
         &self.chunks
     }
 
@@ -88,9 +88,9 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
     /// Whether it is certain, without looking at single samples, that the chunk has no surface: it lies beyond the
     /// bounds, or all that its mesh reads is one weight (at the border of a bounded grid, the one farthest outside).
     pub fn is_uniform(&self) -> bool {
-        let weight = |chunk: Option<&Chunk<W>>| match chunk {
-            Some(Chunk::Uniform(voxel)) => Some(voxel.weight),
-            Some(Chunk::Samples(_)) => None,
+        let weight = |chunk: Option<&GridChunk<W>>| match chunk {
+            Some(GridChunk::Uniform(voxel)) => Some(voxel.weight),
+            Some(GridChunk::Samples(_)) => None,
             None => Some(W::OUTSIDE),
         };
         let first = weight(self.chunks[CENTRE]);
@@ -112,11 +112,12 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         // Every row is read from three chunks at once: most of the time goes into waiting for memory.
         for (line, chunks) in self.chunks.as_chunks::<3>().0.iter().enumerate() {
             let [y, z] = [spans[line % 3], spans[line / 3]];
-            let uniform = chunks.map(|chunk| if let Some(Chunk::Uniform(voxel)) = chunk { *voxel } else { Voxel::AIR });
+            let uniform =
+                chunks.map(|chunk| if let Some(GridChunk::Uniform(voxel)) = chunk { *voxel } else { Voxel::AIR });
             let weights = uniform.map(|voxel| [voxel.weight; MAX_CHUNK_CELLS as usize]);
             let materials = uniform.map(|voxel| [voxel.material; MAX_CHUNK_CELLS as usize]);
             let samples =
-                chunks.map(|chunk| if let Some(Chunk::Samples(samples)) = chunk { Some(samples) } else { None });
+                chunks.map(|chunk| if let Some(GridChunk::Samples(samples)) = chunk { Some(samples) } else { None });
             let weights = array::from_fn(|i| samples[i].map_or(&weights[i][..], |samples| &samples.weights));
             let materials = array::from_fn(|i| samples[i].map_or(&materials[i][..], |samples| &samples.materials));
             let strides = samples.map(|samples| usize::from(samples.is_some()));

@@ -1,35 +1,35 @@
-//! [`Chunk`]: the samples of one chunk, shared and copied on write, or one voxel for all of them.
+//! [`GridChunk`]: the samples of one chunk, shared and copied on write, or one voxel for all of them.
 
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SpareSamples};
+use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SamplePool};
 use crate::sample::{Voxel, Weight};
 use crate::source::{BOUND_MARGIN, Bound, Source, SourceRegion};
 
-/// Chunks per axis of the boxes that a [`Source`] is asked to bound as a whole: see [`Chunk::from_source`].
+/// Chunks per axis of the boxes that a [`Source`] is asked to bound as a whole: see [`GridChunk::from_source`].
 pub const BOUND_BOX_CHUNKS: i32 = 4;
 
 /// The samples of one chunk. Cloning is cheap, and the clone is unaffected by later edits.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Chunk<W = i16> {
+pub enum GridChunk<W = i16> {
     /// All samples are this one.
     Uniform(Voxel<W>),
     /// One sample a lattice point.
-    Samples(Arc<ChunkSamples<W>>),
+    Samples(Arc<GridSamples<W>>),
 }
 
-/// The samples of a [`Chunk`], `[n·n·n]` each, x fastest.
+/// The samples of a [`GridChunk`], `[n·n·n]` each, x fastest.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ChunkSamples<W = i16> {
+pub struct GridSamples<W = i16> {
     /// Signed distances.
     pub weights: Vec<W>,
     /// Materials.
     pub materials: Vec<u8>,
 }
 
-impl<W: Weight> Chunk<W> {
+impl<W: Weight> GridChunk<W> {
     /// A chunk of air.
     pub const AIR: Self = Self::Uniform(Voxel::AIR);
 
@@ -37,8 +37,8 @@ impl<W: Weight> Chunk<W> {
     ///
     /// The first of these steps that gives an answer decides:
     /// 1. [`Source::bound`] of the [box](Self::bound_box) of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk, grown by
-    ///    4 points: [`Chunk::box_without_sampling`];
-    /// 2. [`Source::bound`] of the chunk, grown by 4 points: [`Chunk::without_sampling_in`];
+    ///    4 points: [`GridChunk::box_without_sampling`];
+    /// 2. [`Source::bound`] of the chunk, grown by 4 points: [`GridChunk::without_sampling_in`];
     /// 3. [`Source::bound_closely`] of the chunk;
     /// 4. [`Source::fill`].
     ///
@@ -53,7 +53,7 @@ impl<W: Weight> Chunk<W> {
         Self::from_source_counted(source, position, cells, spacing).0
     }
 
-    /// The result of [`Chunk::from_source`], and whether it took sampling (step 4). Arguments as there.
+    /// The result of [`GridChunk::from_source`], and whether it took sampling (step 4). Arguments as there.
     pub fn from_source_counted(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -66,8 +66,8 @@ impl<W: Weight> Chunk<W> {
         }
     }
 
-    /// Steps 3 and 4 of [`Chunk::from_source`], for callers that have done the others: its result where
-    /// [`Chunk::without_sampling`] gives `None`, and whether it took sampling. Arguments as there.
+    /// Steps 3 and 4 of [`GridChunk::from_source`], for callers that have done the others: its result where
+    /// [`GridChunk::without_sampling`] gives `None`, and whether it took sampling. Arguments as there.
     pub fn from_uncertain_source(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -81,7 +81,7 @@ impl<W: Weight> Chunk<W> {
         }
     }
 
-    /// Steps 1 and 2 of [`Chunk::from_source`]: its result where [`Source::bound`] suffices for it, `None` where steps 3
+    /// Steps 1 and 2 of [`GridChunk::from_source`]: its result where [`Source::bound`] suffices for it, `None` where steps 3
     /// and 4 must follow. Costs two bounds at most. Arguments as there.
     pub fn without_sampling(
         source: &(impl Source + ?Sized),
@@ -94,19 +94,19 @@ impl<W: Weight> Chunk<W> {
         Self::without_sampling_in(of_box, source, position, cells, spacing)
     }
 
-    /// The same for callers that keep the answers of boxes. `of_box`: the answer of [`Chunk::box_without_sampling`] to
+    /// The same for callers that keep the answers of boxes. `of_box`: the answer of [`GridChunk::box_without_sampling`] to
     /// the [box](Self::bound_box) of `position`, for the same source, cells and spacing. Costs one bound at most.
     ///
     /// ```
-    /// use marchless::{BOUND_BOX_CHUNKS, Chunk};
+    /// use marchless::{BOUND_BOX_CHUNKS, GridChunk};
     ///
     /// let source = |[_, y, _]: [f64; 3]| y - 7.5;
     /// let position = [5, -1, 3];
-    /// let corner = Chunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
+    /// let corner = GridChunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
     /// assert_eq!(corner, [4, -4, 0]);
-    /// let of_box = Chunk::<i16>::box_without_sampling(&source, corner, BOUND_BOX_CHUNKS as u32, 16, 1.0);
-    /// let chunk = Chunk::without_sampling_in(of_box, &source, position, 16, 1.0);
-    /// assert_eq!(chunk, Chunk::without_sampling(&source, position, 16, 1.0));
+    /// let of_box = GridChunk::<i16>::box_without_sampling(&source, corner, BOUND_BOX_CHUNKS as u32, 16, 1.0);
+    /// let chunk = GridChunk::without_sampling_in(of_box, &source, position, 16, 1.0);
+    /// assert_eq!(chunk, GridChunk::without_sampling(&source, position, 16, 1.0));
     /// ```
     pub fn without_sampling_in(
         of_box: Option<Self>,
@@ -120,8 +120,8 @@ impl<W: Weight> Chunk<W> {
 
     /// Each chunk of a box, which are all alike, where [`Source::bound`] is certain of the box grown by 4 points.
     ///
-    /// `position`: the lowest chunk. `chunks`: chunks per axis. Other arguments as of [`Chunk::from_source`]. Only the
-    /// answer to a whole box of [`BOUND_BOX_CHUNKS`], aligned as [`Chunk::bound_box`] says, is sure to be what
+    /// `position`: the lowest chunk. `chunks`: chunks per axis. Other arguments as of [`GridChunk::from_source`]. Only the
+    /// answer to a whole box of [`BOUND_BOX_CHUNKS`], aligned as [`GridChunk::bound_box`] says, is sure to be what
     /// `from_source` gives: of another box, an answer may differ from it far from the surface.
     pub fn box_without_sampling(
         source: &(impl Source + ?Sized),
@@ -178,12 +178,12 @@ impl<W: Weight> Chunk<W> {
     }
 
     /// The samples, to be changed: a uniform chunk is written out, a shared one copied.
-    pub(crate) fn samples_mut(&mut self, cells: u32, spare: &mut SpareSamples<W>) -> &mut ChunkSamples<W> {
+    pub(crate) fn samples_mut(&mut self, cells: u32, pool: &mut SamplePool<W>) -> &mut GridSamples<W> {
         if let Self::Uniform(voxel) = *self {
-            *self = Self::Samples(spare.filled(voxel, (cells as usize).pow(3)));
+            *self = Self::Samples(pool.filled(voxel, (cells as usize).pow(3)));
         }
         match self {
-            Self::Samples(samples) => spare.make_mut(samples),
+            Self::Samples(samples) => pool.make_mut(samples),
             Self::Uniform(_) => unreachable!("written out above"),
         }
     }
@@ -204,7 +204,7 @@ impl<W: Weight> Chunk<W> {
             {
                 Self::Uniform(Voxel { weight, material })
             }
-            _ => Self::Samples(Arc::new(ChunkSamples { weights, materials })),
+            _ => Self::Samples(Arc::new(GridSamples { weights, materials })),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use alloc::collections::{BTreeMap, btree_map::Entry};
 
-use super::Chunk;
+use super::GridChunk;
 use super::occupancy::Occupancy;
 use crate::lattice::Region;
 use crate::sample::Weight;
@@ -10,7 +10,7 @@ use crate::sample::Weight;
 /// A map from chunk positions to chunks. All positions are such as there can be in a grid.
 #[derive(Clone, Debug)]
 pub(super) struct Chunks<W> {
-    map: BTreeMap<[i32; 3], Chunk<W>>,
+    map: BTreeMap<[i32; 3], GridChunk<W>>,
     /// The map's keys.
     occupancy: Occupancy,
 }
@@ -20,44 +20,44 @@ impl<W: Weight> Chunks<W> {
         Self { map: BTreeMap::new(), occupancy: Occupancy::default() }
     }
 
-    pub(super) fn get(&self, position: [i32; 3]) -> Option<&Chunk<W>> {
+    pub(super) fn get(&self, position: [i32; 3]) -> Option<&GridChunk<W>> {
         self.map.get(&position)
     }
 
-    pub(super) fn get_mut(&mut self, position: [i32; 3]) -> Option<&mut Chunk<W>> {
+    pub(super) fn get_mut(&mut self, position: [i32; 3]) -> Option<&mut GridChunk<W>> {
         self.map.get_mut(&position)
     }
 
     /// The chunk at `position`, made of air where it is absent.
-    pub(super) fn get_mut_or_air(&mut self, position: [i32; 3]) -> &mut Chunk<W> {
+    pub(super) fn get_mut_or_air(&mut self, position: [i32; 3]) -> &mut GridChunk<W> {
         match self.map.entry(position) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {
                 self.occupancy.insert(position);
-                entry.insert(Chunk::AIR)
+                entry.insert(GridChunk::AIR)
             }
         }
     }
 
-    pub(super) fn insert(&mut self, position: [i32; 3], chunk: Chunk<W>) {
+    pub(super) fn insert(&mut self, position: [i32; 3], chunk: GridChunk<W>) {
         if self.map.insert(position, chunk).is_none() {
             self.occupancy.insert(position);
         }
     }
 
-    pub(super) fn remove(&mut self, position: [i32; 3]) -> Option<Chunk<W>> {
+    pub(super) fn remove(&mut self, position: [i32; 3]) -> Option<GridChunk<W>> {
         let chunk = self.map.remove(&position)?;
         self.occupancy.remove(position);
         Some(chunk)
     }
 
     /// All chunks, in order of position.
-    pub(super) fn iter(&self) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.map.iter().map(|(position, chunk)| (*position, chunk))
     }
 
     /// The chunks from `position` on, in order of position.
-    pub(super) fn from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &Chunk<W>)> {
+    pub(super) fn from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.map.range(position..).map(|(position, chunk)| (*position, chunk))
     }
 

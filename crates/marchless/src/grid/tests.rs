@@ -16,17 +16,17 @@ fn voxel() -> impl Strategy<Value = Voxel> {
 }
 
 /// One of: absent, uniform (often air), samples.
-fn chunk(cells: u32) -> impl Strategy<Value = Option<Chunk>> {
+fn chunk(cells: u32) -> impl Strategy<Value = Option<GridChunk>> {
     let len = (cells as usize).pow(3);
     prop_oneof![
         2 => Just(None),
-        1 => Just(Some(Chunk::AIR)),
-        2 => voxel().prop_map(|voxel| Some(Chunk::Uniform(voxel))),
+        1 => Just(Some(GridChunk::AIR)),
+        2 => voxel().prop_map(|voxel| Some(GridChunk::Uniform(voxel))),
         3 => any::<u64>().prop_map(move |seed| Some(noise_chunk(seed, len))),
     ]
 }
 
-fn noise_chunk(seed: u64, len: usize) -> Chunk {
+fn noise_chunk(seed: u64, len: usize) -> GridChunk {
     let mut state = seed | 1;
     let mut next = || {
         state ^= state << 13;
@@ -36,7 +36,7 @@ fn noise_chunk(seed: u64, len: usize) -> Chunk {
     };
     let weights = (0..len).map(|_| next() as i16).collect();
     let materials = (0..len).map(|_| next() as u8).collect();
-    Chunk::Samples(Arc::new(ChunkSamples { weights, materials }))
+    GridChunk::Samples(Arc::new(GridSamples { weights, materials }))
 }
 
 /// A grid of up to 3³ random chunks around `centre`, its bounds none, or a box of 1 to 5 chunks per axis around it.
@@ -124,7 +124,7 @@ proptest! {
     fn uniform_neighbourhoods_have_no_surface((grid, centre) in grid()) {
         let mut emptied = grid.clone();
         let sampled: Vec<_> =
-            grid.chunks().filter(|(_, chunk)| matches!(chunk, Chunk::Samples(_))).map(|(p, _)| p).collect();
+            grid.chunks().filter(|(_, chunk)| matches!(chunk, GridChunk::Samples(_))).map(|(p, _)| p).collect();
         for position in sampled {
             emptied.remove(position);
         }
@@ -145,7 +145,7 @@ proptest! {
                         prop_assert!(mesh.is_empty(), "at isovalue {}", isovalue);
                     }
                 }
-                let whole = neighbourhood.chunks.iter().all(|chunk| matches!(chunk, Some(Chunk::Uniform(_))));
+                let whole = neighbourhood.chunks.iter().all(|chunk| matches!(chunk, Some(GridChunk::Uniform(_))));
                 prop_assert!(!(whole && one_weight) || neighbourhood.is_uniform());
             }
         }
@@ -155,7 +155,7 @@ proptest! {
     fn bounded_grids_look_as_if_walled((grid, centre) in grid(), chunk_voxel in voxel(), isovalue in -2..3i16) {
         let mut grid = grid;
         let Some(planes) = grid.planes() else { return Ok(()) };
-        grid.insert(centre, Chunk::Uniform(chunk_voxel)).unwrap();
+        grid.insert(centre, GridChunk::Uniform(chunk_voxel)).unwrap();
         for point in grid.chunk_region(centre).points() {
             let depth = (0..3).map(|axis| (point[axis] - planes.min[axis]).min(planes.max[axis] - point[axis]));
             let depth = depth.min().unwrap();
@@ -245,7 +245,7 @@ proptest! {
 fn every_write_of_a_clone_leaves_the_original_alone() {
     let mut grid = Grid::<i16>::new(8).unwrap();
     grid.insert([0; 3], noise_chunk(5, 512)).unwrap();
-    grid.insert([1, 0, 0], Chunk::Uniform(Voxel::new(-300, 2))).unwrap();
+    grid.insert([1, 0, 0], GridChunk::Uniform(Voxel::new(-300, 2))).unwrap();
     let original = grid.clone();
     let snapshot = grid.neighbourhood([0; 3]);
     let samples = |grid: &Grid| -> Vec<_> { Region::new([-8; 3], [24; 3]).points().map(|p| grid.get(p)).collect() };
@@ -256,7 +256,7 @@ fn every_write_of_a_clone_leaves_the_original_alone() {
     grid.set([3, 3, 3], Voxel::new(9, 9)).unwrap();
     grid.set([9, 3, 3], Voxel::new(9, 9)).unwrap();
     grid.remove([1, 0, 0]);
-    grid.insert([0, 1, 0], Chunk::Uniform(Voxel::new(-1, 1))).unwrap();
+    grid.insert([0, 1, 0], GridChunk::Uniform(Voxel::new(-1, 1))).unwrap();
 
     assert_ne!(samples(&grid), before);
     assert_eq!(samples(&original), before);
@@ -269,7 +269,7 @@ fn every_write_of_a_clone_leaves_the_original_alone() {
 #[test]
 fn snapshots_may_be_sent_to_other_threads() {
     fn sent<T: Send + Sync + 'static>() {}
-    sent::<(Neighbourhood<i16>, Chunk<f32>, Grid<i8>)>();
+    sent::<(Neighbourhood<i16>, GridChunk<f32>, Grid<i8>)>();
 }
 
 #[test]
@@ -282,24 +282,24 @@ fn writing_what_is_there_changes_nothing() {
 #[test]
 fn reading_copies_nothing() {
     let mut grid = Grid::<i16>::bounded(8, Region::new([0; 3], [1; 3])).unwrap();
-    let shared = Arc::new(ChunkSamples { weights: (0..512).map(|i| i - 1000).collect(), materials: vec![0; 512] });
-    grid.insert([0; 3], Chunk::Samples(Arc::clone(&shared))).unwrap();
+    let shared = Arc::new(GridSamples { weights: (0..512).map(|i| i - 1000).collect(), materials: vec![0; 512] });
+    grid.insert([0; 3], GridChunk::Samples(Arc::clone(&shared))).unwrap();
     let clone = grid.clone();
     grid.neighbourhood([0; 3]).block(0.0, &mut Block::new());
-    assert!(matches!(clone.chunk([0; 3]), Some(Chunk::Samples(kept)) if Arc::ptr_eq(kept, &shared)));
+    assert!(matches!(clone.chunk([0; 3]), Some(GridChunk::Samples(kept)) if Arc::ptr_eq(kept, &shared)));
     grid.set([1, 2, 3], Voxel::new(0, 0)).unwrap();
-    assert!(matches!(grid.chunk([0; 3]), Some(Chunk::Samples(kept)) if !Arc::ptr_eq(kept, &shared)));
-    grid.insert([0; 3], Chunk::Uniform(Voxel::new(i16::MIN, 1))).unwrap();
-    assert!(matches!(grid.chunk([0; 3]), Some(Chunk::Uniform(_))), "rock needs no samples at the border");
+    assert!(matches!(grid.chunk([0; 3]), Some(GridChunk::Samples(kept)) if !Arc::ptr_eq(kept, &shared)));
+    grid.insert([0; 3], GridChunk::Uniform(Voxel::new(i16::MIN, 1))).unwrap();
+    assert!(matches!(grid.chunk([0; 3]), Some(GridChunk::Uniform(_))), "rock needs no samples at the border");
 }
 
 #[test]
 fn errors_say_what_was_expected() {
     for found in [0, 7, 63, u32::MAX] {
         assert_eq!(Grid::<i16>::new(found).unwrap_err(), GridError::ChunkCells { found });
-        assert_eq!(Chunk::<i16>::from_samples(vec![], vec![], found).unwrap_err(), GridError::ChunkCells { found });
+        assert_eq!(GridChunk::<i16>::from_samples(vec![], vec![], found).unwrap_err(), GridError::ChunkCells { found });
     }
-    let error = Chunk::from_samples(vec![0i16; 512], vec![0; 511], 8).unwrap_err();
+    let error = GridChunk::from_samples(vec![0i16; 512], vec![0; 511], 8).unwrap_err();
     assert_eq!(error, GridError::SamplesLength { cells: 8, expected: 512, weights: 512, materials: 511 });
 
     let bounds = Region::new([0; 3], [2, 1, 1]);
@@ -310,7 +310,7 @@ fn errors_say_what_was_expected() {
     }
     let error = grid.insert([0; 3], noise_chunk(1, 729)).unwrap_err();
     assert_eq!(error, GridError::SamplesLength { cells: 8, expected: 512, weights: 729, materials: 729 });
-    assert!(grid.insert([2, 0, 0], Chunk::AIR).is_err());
+    assert!(grid.insert([2, 0, 0], GridChunk::AIR).is_err());
     assert!(grid.dirty().is_empty() && grid.chunks().next().is_none(), "refused writes change nothing");
 
     for bounds in
@@ -334,9 +334,9 @@ fn the_ends_of_the_lattice_are_reached_without_panic() {
                 assert_eq!(stored, bounds.contains(grid.chunk_of(point)));
                 assert_eq!(grid.get(point).material == 3, stored);
                 let _ = (grid.chunks_affected_by(Region::new(point, [b, a, b])), grid.chunk_region(point));
-                assert_eq!(grid.insert(point, Chunk::AIR).is_ok(), bounds.contains(point));
+                assert_eq!(grid.insert(point, GridChunk::AIR).is_ok(), bounds.contains(point));
                 grid.neighbourhood(point).block(0.0, &mut block);
-                let _ = Chunk::<i16>::from_source(&|_| f64::NAN, point, cells, 1.0);
+                let _ = GridChunk::<i16>::from_source(&|_| f64::NAN, point, cells, 1.0);
             }
             grid.take_dirty();
             grid.mark_dirty(Region::new([i32::MIN; 3], [i32::MAX; 3]));
@@ -355,7 +355,7 @@ fn the_ends_of_the_lattice_are_reached_without_panic() {
 fn huge_regions_mark_the_chunks_within_and_around_and_no_others() {
     let mut grid = Grid::<i16>::new(8).unwrap();
     for position in [[0, 0, 0], [70_000, -3, 5], [-50, 2, 2], [9, 9, 400_000]] {
-        grid.load(position, Chunk::AIR).unwrap();
+        grid.insert_clean(position, GridChunk::AIR).unwrap();
     }
     let region = Region::new([-80_000, -80_000, -80_000], [10_000_000, 80_000, 80_000]);
     grid.mark_dirty(region);
@@ -382,7 +382,7 @@ proptest! {
             }
             // All ways in and out.
             match position[0].rem_euclid(3) {
-                0 => drop(grid.unload(position)),
+                0 => drop(grid.remove_clean(position)),
                 1 => drop(grid.remove(position)),
                 _ => drop(grid.set(grid.chunk_region(position).min, Voxel::new(-7, 1))),
             }
@@ -444,9 +444,9 @@ proptest! {
         for position in Region::new([-4; 3], [4; 3]).points() {
             for (grid, bounds) in grids.iter_mut().zip([true, false]) {
                 let source: Box<dyn Source> = Box::new(Shell { bounds, ..shell });
-                grid.insert(position, Chunk::from_source(&source, position, cells, spacing)).unwrap();
+                grid.insert(position, GridChunk::from_source(&source, position, cells, spacing)).unwrap();
             }
-            spared += u32::from(matches!(grids[0].chunk(position), Some(Chunk::Uniform(_))));
+            spared += u32::from(matches!(grids[0].chunk(position), Some(GridChunk::Uniform(_))));
             for point in grids[0].chunk_region(position).points() {
                 let [fast, plain] = [&grids[0], &grids[1]].map(|grid| grid.get(point));
                 prop_assert_eq!(fast.weight < 0, plain.weight < 0);
@@ -473,10 +473,10 @@ proptest! {
 #[test]
 fn chunks_of_one_voxel_are_uniform() {
     let rock = |_: [f64; 3]| -1e9;
-    assert_eq!(Chunk::from_source(&rock, [1, 2, 3], 8, 1.0), Chunk::Uniform(Voxel::new(i16::MIN, 0)));
+    assert_eq!(GridChunk::from_source(&rock, [1, 2, 3], 8, 1.0), GridChunk::Uniform(Voxel::new(i16::MIN, 0)));
     let mut weights = vec![5i16; 512];
-    assert_eq!(Chunk::from_samples(weights.clone(), vec![3; 512], 8), Ok(Chunk::Uniform(Voxel::new(5, 3))));
+    assert_eq!(GridChunk::from_samples(weights.clone(), vec![3; 512], 8), Ok(GridChunk::Uniform(Voxel::new(5, 3))));
     weights[511] = 6;
-    let chunk = Chunk::from_samples(weights, vec![3; 512], 8).unwrap();
+    let chunk = GridChunk::from_samples(weights, vec![3; 512], 8).unwrap();
     assert_eq!((chunk.voxel(510).weight, chunk.voxel(511).weight, chunk.voxel(512)), (5, 6, Voxel::AIR));
 }

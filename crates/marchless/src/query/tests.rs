@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    brush::{BrushShape, Operation, Stamp},
+    brush::{Operation, QuantisedShape, QuantisedStamp},
     buffer::MeshBuffer,
     lattice::Region,
     mesher::{MeshSettings, Mesher},
@@ -25,9 +25,9 @@ fn grid(seed: u64, bounded: bool) -> Grid<i16> {
     };
     for number in 0..9 {
         let center = [0, 1, 2].map(|_| next(240) as f64 / 10.0 - 8.0);
-        let shape = BrushShape::sphere(center, next(60) as f64 / 10.0 + 1.0).unwrap();
+        let shape = QuantisedShape::sphere(center, next(60) as f64 / 10.0 + 1.0).unwrap();
         let operation = if number % 3 == 2 { Operation::Dig } else { Operation::Add };
-        grid.apply(&Stamp::new(shape, operation, number));
+        grid.apply(&QuantisedStamp::new(shape, operation, number));
     }
     for _ in 0..60 {
         let point = [0, 1, 2].map(|_| next(8) as i32);
@@ -229,7 +229,7 @@ fn rays_from_beyond_all_precision_come_to_an_end() {
 #[test]
 fn both_sides_are_hit_and_the_normal_points_out() {
     let mut grid = Grid::<i16>::new(16).unwrap();
-    grid.apply(&Stamp::new(BrushShape::sphere([0.0; 3], 6.0).unwrap(), Operation::Add, 4));
+    grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 6.0).unwrap(), Operation::Add, 4));
     let outside = ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], f64::INFINITY).unwrap();
     assert!((outside.distance - 84.0).abs() < 0.05 && outside.normal[2] > 0.9);
     assert_eq!((outside.material, outside.chunk), (4, [0, 0, 0]));
@@ -261,7 +261,7 @@ fn chunks_far_apart_are_not_walked_between() {
     let far = [(1 << 27) - 100, -1000, 7];
     let ball = |center: [i32; 3], material| {
         let center = center.map(|v| f64::from(v) * 8.0);
-        Stamp::new(BrushShape::sphere(center, 6.0).unwrap(), Operation::Add, material)
+        QuantisedStamp::new(QuantisedShape::sphere(center, 6.0).unwrap(), Operation::Add, material)
     };
     grid.apply(&ball([0, 0, 0], 1));
     grid.apply(&ball(far, 2));
@@ -312,8 +312,8 @@ fn sparse_grid() -> impl Strategy<Value = Grid<i16>> {
     let end = Grid::<i16>::largest(CELLS).max[0];
     let coordinate = move || prop_oneof![6 => -3..3i32, 2 => -70..70i32, 1 => -100_000..100_000i32, 1 => Just(end - 2), 1 => Just(-end)];
     let chunk = prop_oneof![
-        1 => Just(Chunk::AIR),
-        1 => any::<u8>().prop_map(|material| Chunk::Uniform(Voxel::new(-300, material))),
+        1 => Just(GridChunk::AIR),
+        1 => any::<u8>().prop_map(|material| GridChunk::Uniform(Voxel::new(-300, material))),
         3 => (any::<u64>(), any::<u8>()).prop_map(|(seed, material)| {
             // Slopes, so that the chunk has a surface somewhere, of one side or more.
             let slope = [0, 10, 20].map(|shift| (seed >> shift) as i32 % 256 - 128);
@@ -321,7 +321,7 @@ fn sparse_grid() -> impl Strategy<Value = Grid<i16>> {
             let weight = |p: [i32; 3]| (start + (0..3).map(|axis| slope[axis] * p[axis]).sum::<i32>()) as i16;
             let weights: Vec<_> = Region::new([0; 3], [CELLS as i32; 3]).points().map(weight).collect();
             let materials = alloc::vec![material; weights.len()];
-            Chunk::Samples(Arc::new(ChunkSamples { weights, materials }))
+            GridChunk::Samples(Arc::new(GridSamples { weights, materials }))
         }),
     ];
     let chunks = prop::collection::vec(([coordinate(), coordinate(), coordinate()], chunk), 1..40);
@@ -333,7 +333,7 @@ fn sparse_grid() -> impl Strategy<Value = Grid<i16>> {
         }
         .unwrap();
         for (position, chunk) in chunks {
-            grid.load(position, chunk).unwrap();
+            grid.insert_clean(position, chunk).unwrap();
         }
         grid
     })
@@ -393,7 +393,7 @@ fn walks_are_short_whatever_the_grid_holds() {
     let ends = [grid.limits().min, grid.limits().max.map(|v| v - 1)];
     let mut load = |region: Region| {
         for position in region.points() {
-            grid.load(position, Chunk::AIR).unwrap();
+            grid.insert_clean(position, GridChunk::AIR).unwrap();
         }
         // Down, along a slope, past all, and from one end of the lattice to the other.
         let middle = ends[1].map(|v| f64::from(v) * 8.0);

@@ -1,6 +1,6 @@
 //! A chunk's base samples are the same whichever way they are asked for, with bounds that are legal and as odd as can be.
 
-use marchless::{BOUND_BOX_CHUNKS, Bound, Chunk, Grid, Region, Source, SourceRegion};
+use marchless::{BOUND_BOX_CHUNKS, Bound, Grid, GridChunk, Region, Source, SourceRegion};
 use proptest::prelude::*;
 
 use crate::support::random;
@@ -129,8 +129,8 @@ fn source() -> impl Strategy<Value = Odd> {
     (solid, knows(), knows()).prop_map(|(solid, bound, closely)| Odd { solid, bound, closely })
 }
 
-/// The steps of `Chunk::from_source`, in their order, written out.
-fn plain(source: &Odd, position: [i32; 3], spacing: f64) -> (Chunk, bool) {
+/// The steps of `GridChunk::from_source`, in their order, written out.
+fn plain(source: &Odd, position: [i32; 3], spacing: f64) -> (GridChunk, bool) {
     let region = |corner: [i32; 3], points: i32| {
         let min = corner.map(|v| v * CELLS as i32);
         SourceRegion { min, size: [points as u32; 3], level: 0, spacing }
@@ -139,15 +139,17 @@ fn plain(source: &Odd, position: [i32; 3], spacing: f64) -> (Chunk, bool) {
     let whole = region(position.map(|v| v - v.rem_euclid(4)), 4 * CELLS as i32);
     for bound in [source.bound(&whole.grown(4)), source.bound(&chunk.grown(4)), source.bound_closely(&chunk)] {
         match bound {
-            Bound::Inside { material } => return (Chunk::Uniform(marchless::Voxel::new(i16::MIN, material)), false),
-            Bound::Outside => return (Chunk::AIR, false),
+            Bound::Inside { material } => {
+                return (GridChunk::Uniform(marchless::Voxel::new(i16::MIN, material)), false);
+            }
+            Bound::Outside => return (GridChunk::AIR, false),
             Bound::Mixed => {}
         }
     }
     let (mut distances, mut materials) = (vec![0.0; chunk.len()], vec![0; chunk.len()]);
     source.fill(&chunk, &mut distances, &mut materials);
     let weights = distances.into_iter().map(marchless::Weight::from_voxels).collect();
-    (Chunk::from_samples(weights, materials, CELLS).unwrap(), true)
+    (GridChunk::from_samples(weights, materials, CELLS).unwrap(), true)
 }
 
 proptest! {
@@ -160,17 +162,17 @@ proptest! {
         let mut grid = Grid::<i16>::new(CELLS).unwrap();
         for position in Region::new(start, start.map(|v| v + 4)).points() {
             let expected = plain(&source, position, spacing);
-            let (chunk, sampled) = Chunk::from_source_counted(&source, position, CELLS, spacing);
+            let (chunk, sampled) = GridChunk::from_source_counted(&source, position, CELLS, spacing);
             prop_assert_eq!((&chunk, sampled), (&expected.0, expected.1), "at {:?}", position);
-            prop_assert_eq!(&Chunk::from_source(&source, position, CELLS, spacing), &chunk);
+            prop_assert_eq!(&GridChunk::from_source(&source, position, CELLS, spacing), &chunk);
             grid.fill(position, &source, spacing).unwrap();
             prop_assert_eq!(grid.chunk(position), Some(&chunk));
-            let early = Chunk::without_sampling(&source, position, CELLS, spacing);
+            let early = GridChunk::without_sampling(&source, position, CELLS, spacing);
             prop_assert!(early.as_ref().is_none_or(|early| *early == chunk), "{:?} at {:?}", early, position);
-            let corner = Chunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
-            let of_box = Chunk::box_without_sampling(&source, corner, BOUND_BOX_CHUNKS as u32, CELLS, spacing);
+            let corner = GridChunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
+            let of_box = GridChunk::box_without_sampling(&source, corner, BOUND_BOX_CHUNKS as u32, CELLS, spacing);
             prop_assert!(of_box.as_ref().is_none_or(|of_box| *of_box == chunk), "{:?} at {:?}", of_box, position);
-            prop_assert_eq!(Chunk::without_sampling_in(of_box, &source, position, CELLS, spacing), early);
+            prop_assert_eq!(GridChunk::without_sampling_in(of_box, &source, position, CELLS, spacing), early);
         }
     }
 }
@@ -179,7 +181,7 @@ proptest! {
 #[test]
 fn a_bound_of_the_box_alone_makes_its_chunks_uniform() {
     let source = Odd { solid: Solid::Plane(-1), bound: Knows::Large(40), closely: Knows::Nothing };
-    let sampled = |y: i32| Chunk::<i16>::from_source_counted(&source, [5, y, -7], CELLS, 1.0).1;
+    let sampled = |y: i32| GridChunk::<i16>::from_source_counted(&source, [5, y, -7], CELLS, 1.0).1;
     assert_eq!([-5, -4, 0, 3, 4, 8].map(sampled), [false, true, true, true, false, false]);
 }
 
@@ -190,10 +192,10 @@ fn positions_at_the_ends_of_i32_do_no_harm() {
         let end = i32::MAX / cells as i32;
         for y in [i32::MIN, i32::MIN + 5, -end - 1, -end, end, end + 1, i32::MAX - 4, i32::MAX] {
             for x in [i32::MIN, -3, i32::MAX] {
-                let solid = Chunk::Uniform(marchless::Voxel::new(i16::MIN, 3));
-                let expected = if y < 0 { solid } else { Chunk::AIR };
-                assert_eq!(Chunk::from_source(&source, [x, y, x], cells, 1.0), expected);
-                assert_eq!(Chunk::without_sampling(&source, [x, y, x], cells, 1.0), Some(expected));
+                let solid = GridChunk::Uniform(marchless::Voxel::new(i16::MIN, 3));
+                let expected = if y < 0 { solid } else { GridChunk::AIR };
+                assert_eq!(GridChunk::from_source(&source, [x, y, x], cells, 1.0), expected);
+                assert_eq!(GridChunk::without_sampling(&source, [x, y, x], cells, 1.0), Some(expected));
             }
         }
     }

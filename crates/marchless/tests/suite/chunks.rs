@@ -65,12 +65,12 @@ fn check_whole<W: VolumeWeight>(volume: &Volume) -> Result<(), TestCaseError> {
 }
 
 /// A chunk's cells, and its mesh.
-struct Chunk {
+struct GridChunk {
     region: Region,
     mesh: MeshBuffer,
 }
 
-impl Chunk {
+impl GridChunk {
     fn coordinates(&self, vertex: u32) -> [f64; 3] {
         let position = self.mesh.positions[vertex as usize];
         [0, 1, 2].map(|axis| f64::from(self.region.min[axis]) + f64::from(position[axis]))
@@ -96,7 +96,7 @@ impl Chunk {
 }
 
 /// A mesh for each chunk of at most `cells` cells per axis, of its samples and a layer of padding around them.
-fn chunks<W: VolumeWeight>(volume: &Volume, cells: u32, topology: Topology) -> Result<Vec<Chunk>, TestCaseError> {
+fn chunks<W: VolumeWeight>(volume: &Volume, cells: u32, topology: Topology) -> Result<Vec<GridChunk>, TestCaseError> {
     let counts = volume.cells.map(|n| n.div_ceil(cells) as i32);
     let mut chunks = Vec::new();
     for position in Region::new([0; 3], counts).points() {
@@ -104,7 +104,7 @@ fn chunks<W: VolumeWeight>(volume: &Volume, cells: u32, topology: Topology) -> R
         let max = [0, 1, 2].map(|axis| (min[axis] + cells as i32).min(volume.cells[axis] as i32));
         let cut = volume.cut::<W>(min.map(|v| v - 1), max.map(|v| v + 2));
         let mesh = mesh(cut.samples().padded(), volume, topology)?;
-        let chunk = Chunk { region: Region::new(min, max), mesh };
+        let chunk = GridChunk { region: Region::new(min, max), mesh };
         let bounds = [[0.0; 3], chunk.region.size().map(|n| n as f32)];
         let report = MeshReport::in_box(&chunk.mesh.positions, &chunk.mesh.indices, bounds);
         prop_assert!(report.is_clean(), "{}", report);
@@ -121,9 +121,9 @@ fn check_chunks<W: VolumeWeight>(volume: &Volume, cells: u32, topology: Topology
     // The whole has the same triangles.
     let cut = volume.cut::<W>([-1; 3], volume.cells.map(|n| n as i32 + 2));
     let region = Region::new([0; 3], volume.cells.map(|n| n as i32));
-    let whole = Chunk { region, mesh: mesh(cut.samples().padded(), volume, topology)? };
+    let whole = GridChunk { region, mesh: mesh(cut.samples().padded(), volume, topology)? };
     let mut expected: Vec<_> = whole.triangles().collect();
-    let mut found: Vec<_> = chunks.iter().flat_map(Chunk::triangles).collect();
+    let mut found: Vec<_> = chunks.iter().flat_map(GridChunk::triangles).collect();
     expected.sort_unstable();
     found.sort_unstable();
     prop_assert!(found == expected, "{} triangles in chunks, {} in the whole", found.len(), expected.len());
@@ -131,7 +131,7 @@ fn check_chunks<W: VolumeWeight>(volume: &Volume, cells: u32, topology: Topology
 }
 
 /// All chunks whose box holds a vertex have it, with the same bits.
-fn check_vertices(chunks: &[Chunk]) -> Result<(), TestCaseError> {
+fn check_vertices(chunks: &[GridChunk]) -> Result<(), TestCaseError> {
     let mut known: HashMap<Place, ([u32; 3], u8, usize)> = HashMap::new();
     for chunk in chunks {
         for vertex in 0..chunk.mesh.positions.len() {
@@ -144,7 +144,7 @@ fn check_vertices(chunks: &[Chunk]) -> Result<(), TestCaseError> {
     }
     for (place, (.., count)) in known {
         let place = place.map(f64::from_bits);
-        let holds = |chunk: &&Chunk| {
+        let holds = |chunk: &&GridChunk| {
             let Region { min, max } = chunk.region;
             (0..3).all(|axis| (f64::from(min[axis])..=f64::from(max[axis])).contains(&place[axis]))
         };
@@ -154,7 +154,7 @@ fn check_vertices(chunks: &[Chunk]) -> Result<(), TestCaseError> {
 }
 
 /// Each side of a rim is one of another chunk's rim the other way round, or lies in a face of the volume.
-fn check_rims(volume: &Volume, chunks: &[Chunk]) -> Result<(), TestCaseError> {
+fn check_rims(volume: &Volume, chunks: &[GridChunk]) -> Result<(), TestCaseError> {
     let mut rims: HashSet<[Place; 2]> = HashSet::new();
     for chunk in chunks {
         let sides = || chunk.mesh.triangles().flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);

@@ -4,7 +4,7 @@ use core::fmt::Debug;
 use std::collections::{BTreeMap, HashMap};
 
 use marchless::{
-    Block, Chunk, ChunkSamples, Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Topology, Voxel, Weight,
+    Block, Grid, GridChunk, GridSamples, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Topology, Voxel, Weight,
 };
 use proptest::prelude::*;
 
@@ -46,7 +46,7 @@ impl AnyWeight for f32 {
     }
 }
 
-fn chunk<W: AnyWeight>(field: Field, seed: u64, region: Region) -> Chunk<W> {
+fn chunk<W: AnyWeight>(field: Field, seed: u64, region: Region) -> GridChunk<W> {
     let weight = |point: [i32; 3]| {
         let bits = random(seed, point);
         let [x, y, z] = point.map(|v| v as f32);
@@ -59,11 +59,11 @@ fn chunk<W: AnyWeight>(field: Field, seed: u64, region: Region) -> Chunk<W> {
     };
     if let Field::Uniform = field {
         let inside = random(seed, region.min) % 3 < 2;
-        return Chunk::Uniform(Voxel::new(if inside { W::INSIDE } else { W::OUTSIDE }, inside as u8));
+        return GridChunk::Uniform(Voxel::new(if inside { W::INSIDE } else { W::OUTSIDE }, inside as u8));
     }
     let weights = region.points().map(weight).collect();
     let materials = region.points().map(|point| (random(seed, point) >> 40) as u8).collect();
-    Chunk::Samples(ChunkSamples { weights, materials }.into())
+    GridChunk::Samples(GridSamples { weights, materials }.into())
 }
 
 fn grid<W: AnyWeight>(field: Field, seed: u64, cells: u32, bounds: Region) -> Grid<W> {
@@ -206,7 +206,7 @@ fn a_full_grid_is_a_box_half_a_voxel_inside() {
     let bounds = Region::new([-1, 0, 2], [1, 1, 3]);
     let mut grid = Grid::<i16>::bounded(8, bounds).expect("a sound size");
     for position in bounds.points() {
-        grid.insert(position, Chunk::Uniform(Voxel::new(i16::MIN, 1))).expect("within the bounds");
+        grid.insert(position, GridChunk::Uniform(Voxel::new(i16::MIN, 1))).expect("within the bounds");
     }
     let meshes = meshes(&grid, &MeshSettings::default());
     let mut ends = [[f64::MAX; 3], [f64::MIN; 3]];

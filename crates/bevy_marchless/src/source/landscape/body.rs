@@ -62,7 +62,7 @@ const OTHER_SEED: u32 = 0x51ED;
 pub(super) const BY_RULES: u16 = 256;
 
 /// A box that is asked about.
-pub(super) struct Region<'a> {
+pub(super) struct QueryBox<'a> {
     /// Its lowest and highest coordinates. Units: world.
     pub(super) sides: [Interval; 3],
     /// World units between samples.
@@ -75,12 +75,12 @@ pub(super) struct Region<'a> {
     pub(super) strictly: bool,
     /// The columns of each ground, by its number, where they are to be looked at: all of them, and which part of them
     /// lies in the box, along x and z.
-    pub(super) columns: Option<Window<'a>>,
+    pub(super) columns: Option<ColumnWindow<'a>>,
 }
 
 /// A part of the columns of all grounds.
 #[derive(Clone)]
-pub(super) struct Window<'a> {
+pub(super) struct ColumnWindow<'a> {
     pub(super) columns: &'a [Vec<Column>],
     /// Columns along x.
     pub(super) width: usize,
@@ -89,24 +89,24 @@ pub(super) struct Window<'a> {
 
 /// What is known of a solid in a box.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known {
+pub(super) struct KnownDistance {
     /// Between which values all distances lie. Units: world.
     pub(super) distance: Interval,
     /// The same with the margin to both sides.
-    pub(super) roomy: Interval,
+    pub(super) with_margin: Interval,
     /// What solid samples are made of, where that is certain.
     pub(super) matter: Option<u16>,
 }
 
-impl Known {
-    fn new(distance: Interval, region: &Region, matter: Option<u16>) -> Self {
-        let roomy = Interval { low: distance.low - region.margin, high: distance.high + region.margin };
-        Self { distance, roomy, matter }
+impl KnownDistance {
+    fn new(distance: Interval, region: &QueryBox, matter: Option<u16>) -> Self {
+        let with_margin = Interval { low: distance.low - region.margin, high: distance.high + region.margin };
+        Self { distance, with_margin, matter }
     }
 
     /// The distances sent through a function of intervals.
     fn map(self, through: impl Fn(Interval) -> Interval) -> Self {
-        Self { distance: through(self.distance), roomy: through(self.roomy), ..self }
+        Self { distance: through(self.distance), with_margin: through(self.with_margin), ..self }
     }
 }
 
@@ -143,11 +143,11 @@ impl Body {
     }
 
     /// What is known of it in a box. `noisily`: whether to evaluate noise for it, once for each noise.
-    pub(super) fn known(&self, region: &Region, noisily: bool, calls: &mut u64) -> Known {
+    pub(super) fn known(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> KnownDistance {
         match self {
-            Self::Everything => Known::new(Interval::exactly(f64::NEG_INFINITY), region, Some(BY_RULES)),
+            Self::Everything => KnownDistance::new(Interval::exactly(f64::NEG_INFINITY), region, Some(BY_RULES)),
             Self::Ground(ground) => ground.known(region, noisily, calls),
-            Self::Noise(noise) => Known::new(noise.distance(region, noisily, calls), region, Some(BY_RULES)),
+            Self::Noise(noise) => KnownDistance::new(noise.distance(region, noisily, calls), region, Some(BY_RULES)),
             Self::Shape(shape) => {
                 let (center, radius) = region.ball();
                 let distance = shape.sample(center).0;
@@ -155,7 +155,7 @@ impl Body {
                 let more = radius + if rounding.is_finite() { rounding } else { 0.0 };
                 let distance = Interval { low: distance - more, high: distance + more };
                 let material = if distance.low < 0.0 { shape.only_material_around(center, radius) } else { None };
-                Known::new(distance, region, material.map(u16::from))
+                KnownDistance::new(distance, region, material.map(u16::from))
             }
             Self::Union(parts) => {
                 let parts = parts.iter().map(|part| part.known(region, noisily, calls).map(|d| far(d, region.reach)));
@@ -175,7 +175,11 @@ impl Body {
                     if so_far.distance.high >= room {
                         distance.low = distance.low.min(room);
                     }
-                    Known { distance, roomy: so_far.roomy.max(cut.roomy), matter: so_far.matter }
+                    KnownDistance {
+                        distance,
+                        with_margin: so_far.with_margin.max(cut.with_margin),
+                        matter: so_far.matter,
+                    }
                 })
             }
         }
@@ -183,13 +187,13 @@ impl Body {
 }
 
 /// Nothing at all.
-const AIR: Known = {
+const AIR: KnownDistance = {
     let far = Interval { low: f64::INFINITY, high: f64::INFINITY };
-    Known { distance: far, roomy: far, matter: Some(BY_RULES) }
+    KnownDistance { distance: far, with_margin: far, matter: Some(BY_RULES) }
 };
 
 /// What lies in either of two solids.
-fn nearer(a: Known, b: Known) -> Known {
+fn nearer(a: KnownDistance, b: KnownDistance) -> KnownDistance {
     let matter = if b.distance.low >= 0.0 || a.distance.high < b.distance.low || a.matter == b.matter {
         a.matter
     } else if a.distance.low >= 0.0 || b.distance.high < a.distance.low {
@@ -197,7 +201,7 @@ fn nearer(a: Known, b: Known) -> Known {
     } else {
         None
     };
-    Known { distance: a.distance.min(b.distance), roomy: a.roomy.min(b.roomy), matter }
+    KnownDistance { distance: a.distance.min(b.distance), with_margin: a.with_margin.min(b.with_margin), matter }
 }
 
 /// Distances that are out of reach are endless.
@@ -210,10 +214,10 @@ fn deep(distance: Interval, reach: f64) -> Interval {
     distance.through(|d| if d <= -reach { f64::NEG_INFINITY } else { d })
 }
 
-impl Region<'_> {
+impl QueryBox<'_> {
     /// What is farther outside is not cut any more. Units: world.
     pub(super) fn room(&self) -> f64 {
-        crate::source::ROOM * self.spacing
+        crate::source::BOUND_MARGIN * self.spacing
     }
 
     /// The smallest ball around the box.
@@ -224,7 +228,7 @@ impl Region<'_> {
 }
 
 impl Ground {
-    fn known(&self, region: &Region, noisily: bool, calls: &mut u64) -> Known {
+    fn known(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> KnownDistance {
         let [x, y, z] = region.sides;
         let Some(window) = &region.columns else {
             let heights =
@@ -234,10 +238,10 @@ impl Ground {
             // A slope makes distances smaller, and keeps their sign.
             let low = if above.low > 0.0 { above.low * flat } else { above.low };
             let high = if above.high < 0.0 { above.high * flat } else { above.high };
-            let known = Known::new(Interval { low, high }, region, Some(BY_RULES));
+            let known = KnownDistance::new(Interval { low, high }, region, Some(BY_RULES));
             // From far away, heights tell more than the steepest slope that there may be.
-            let roomy = Interval { low: above.low - region.margin, high: above.high + region.margin };
-            return if region.strictly { known } else { Known { roomy, ..known } };
+            let with_margin = Interval { low: above.low - region.margin, high: above.high + region.margin };
+            return if region.strictly { known } else { KnownDistance { with_margin, ..known } };
         };
         let mut distance = Interval::NOTHING;
         for row in window.part[1].clone() {
@@ -247,7 +251,7 @@ impl Ground {
                 distance = Interval { low: distance.low.min(low), high: distance.high.max(high) };
             }
         }
-        Known::new(distance, region, Some(BY_RULES))
+        KnownDistance::new(distance, region, Some(BY_RULES))
     }
 }
 
@@ -269,7 +273,7 @@ impl Noise {
     }
 
     /// Between which values distances lie.
-    fn distance(&self, region: &Region, noisily: bool, calls: &mut u64) -> Interval {
+    fn distance(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> Interval {
         let (center, radius) = region.ball();
         // Interpolated noise is made of noise as far away as the lattice is wide.
         let more = if self.lattice > 1 { f64::from(self.lattice) * region.spacing * 3.0_f64.sqrt() } else { 0.0 };

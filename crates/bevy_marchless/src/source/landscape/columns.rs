@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use marchless::SourceRegion;
 
-use super::field::{Field, Places};
+use super::field::{Field, FieldPoints};
 use crate::source::height_field::Column;
 
 /// Columns along a side of a tile.
@@ -113,7 +113,7 @@ impl Columns {
         let [xs, zs] =
             tile.map(|tile| (0..TILE).map(|index| (tile * TILE + index) as f64 * spacing).collect::<Vec<_>>());
         let mut heights = vec![0.0; (TILE * TILE) as usize];
-        self.field.values(&Places::Grid { xs: &xs, zs: &zs }, &mut heights, calls);
+        self.field.values(&FieldPoints::Grid { xs: &xs, zs: &zs }, &mut heights, calls);
         heights.into()
     }
 }

@@ -23,7 +23,7 @@ pub(super) enum Field {
 }
 
 /// Where a field is evaluated.
-pub(super) enum Places<'a> {
+pub(super) enum FieldPoints<'a> {
     /// At all pairs of an x and a z; x changes fastest.
     Grid { xs: &'a [f64], zs: &'a [f64] },
     /// At each x with its z.
@@ -62,7 +62,7 @@ impl Field {
     }
 
     /// The values at `places`, one for each.
-    pub(super) fn values(&self, places: &Places, values: &mut [f64], calls: &mut u64) {
+    pub(super) fn values(&self, places: &FieldPoints, values: &mut [f64], calls: &mut u64) {
         let fold = |fields: &[Self], join: fn(f64, f64) -> f64, none: f64, values: &mut [f64], calls: &mut u64| {
             let Some((first, others)) = fields.split_first() else { return values.fill(none) };
             first.values(places, values, calls);
@@ -96,7 +96,7 @@ impl Field {
                     *x = from_x + reach * *x;
                     *z = from_z + reach * *z;
                 }
-                of.values(&Places::Scattered { xs: &xs, zs: &zs }, values, calls);
+                of.values(&FieldPoints::Scattered { xs: &xs, zs: &zs }, values, calls);
             }
         }
     }
@@ -208,7 +208,7 @@ fn along_curve(points: &[DVec2], x: f64) -> f64 {
     }
 }
 
-impl Places<'_> {
+impl FieldPoints<'_> {
     fn iter(&self) -> Box<dyn Iterator<Item = [f64; 2]> + '_> {
         match *self {
             Self::Grid { xs, zs } => Box::new(zs.iter().flat_map(move |z| xs.iter().map(move |x| [*x, *z]))),

@@ -1,11 +1,11 @@
-//! [`Part`]: a [`Body`] made ready for one region, and evaluated row by row.
+//! [`PreparedBody`]: a [`Body`] made ready for one region, and evaluated row by row.
 
 use core::ops::Range;
 
 use bevy_math::DVec3;
 use marchless::SourceRegion;
 
-use super::body::{BY_RULES, Body, Noise, NoiseKind, Region};
+use super::body::{BY_RULES, Body, Noise, NoiseKind, QueryBox};
 use crate::source::Sdf;
 use crate::source::height_field::Column;
 use crate::source::octaves::Octaves;
@@ -30,20 +30,20 @@ pub(super) struct Line<'a> {
     pub(super) xs: &'a [f64],
     pub(super) y: f64,
     pub(super) z: f64,
-    /// As of [`Region::room`].
+    /// As of [`QueryBox::room`].
     pub(super) room: f32,
-    /// As of [`Region::reach`].
+    /// As of [`QueryBox::reach`].
     pub(super) reach: f32,
 }
 
 /// A [`Body`] made ready for one region: what cannot matter there is left out.
-pub(super) enum Part<'a> {
+pub(super) enum PreparedBody<'a> {
     Everything,
     Ground(&'a [Column]),
-    Noise(Box<Samples<'a>>),
+    Noise(Box<NoiseSamples<'a>>),
     Shape(Sdf),
-    Union { parts: Vec<Part<'a>>, row: Row },
-    Cut { parts: Vec<Part<'a>>, sign: f32, row: Row },
+    Union { parts: Vec<PreparedBody<'a>>, row: Row },
+    Cut { parts: Vec<PreparedBody<'a>>, sign: f32, row: Row },
 }
 
 impl Row {
@@ -59,14 +59,14 @@ impl Row {
     }
 }
 
-impl<'a> Part<'a> {
+impl<'a> PreparedBody<'a> {
     /// `columns`: those of each ground, by its number.
-    pub(super) fn new(body: &'a Body, samples: &SourceRegion, region: &Region, columns: &'a [Vec<Column>]) -> Self {
+    pub(super) fn new(body: &'a Body, samples: &SourceRegion, region: &QueryBox, columns: &'a [Vec<Column>]) -> Self {
         let row = || Row::new(samples.size[0] as usize);
         match body {
             Body::Everything => Self::Everything,
             Body::Ground(ground) => Self::Ground(&columns[ground.number]),
-            Body::Noise(noise) => Self::Noise(Box::new(Samples::new(noise, samples))),
+            Body::Noise(noise) => Self::Noise(Box::new(NoiseSamples::new(noise, samples))),
             Body::Shape(shape) => {
                 let (center, radius) = region.ball();
                 Self::Shape(shape.pruned(center, radius + samples.spacing))
@@ -154,18 +154,18 @@ impl<'a> Part<'a> {
 }
 
 /// Samples of 3-D noise, at each of a region's lattice points or interpolated between every n-th.
-pub(super) struct Samples<'a> {
+pub(super) struct NoiseSamples<'a> {
     noise: &'a Noise,
     /// The noise at the samples of a row.
     rows: [NoiseRow; 2],
     /// By how much the first noise is too far from 0 for tunnels.
     too_far: Vec<f32>,
-    lattice: Option<Lattice>,
+    lattice: Option<NoiseLattice>,
 }
 
-impl<'a> Samples<'a> {
+impl<'a> NoiseSamples<'a> {
     fn new(noise: &'a Noise, region: &SourceRegion) -> Self {
-        let lattice = (noise.lattice > 1).then(|| Lattice::new(noise.lattice, region));
+        let lattice = (noise.lattice > 1).then(|| NoiseLattice::new(noise.lattice, region));
         Self { noise, rows: Default::default(), too_far: Vec::new(), lattice }
     }
 
@@ -247,7 +247,7 @@ fn length([x, y, z]: [f32; 3]) -> f32 {
 const FAR: f32 = 1.5;
 
 /// Noise at every n-th lattice point, each row of it evaluated when it is first needed.
-struct Lattice {
+struct NoiseLattice {
     /// The lowest node, in nodes.
     first: [i64; 3],
     /// Nodes per axis.
@@ -264,7 +264,7 @@ struct Lattice {
     nodes: Vec<[f32; 4]>,
 }
 
-impl Lattice {
+impl NoiseLattice {
     fn new(every: u32, region: &SourceRegion) -> Self {
         let every = i64::from(every);
         let first = region.min.map(|min| i64::from(min).div_euclid(every));

@@ -3,10 +3,10 @@
 use bevy_ecs::entity::Entity;
 
 use super::ChunkTable;
-use super::entry::{Counts, Drawn, Entry, Fill, Role, Shown};
+use super::entry::{Counts, DrawnMesh, Entry, Fill, Role, Shown};
 use super::map::Marks;
 use crate::chunk::ChunkKey;
-use crate::cover::{LeafState, Wanted};
+use crate::cover::{LeafState, Residency};
 
 impl ChunkTable {
     pub(crate) const fn counts(&self) -> Counts {
@@ -31,11 +31,11 @@ impl ChunkTable {
     }
 
     /// What there is of a chunk, as the cover sees it: a leaf that has not been drawn is no more than its samples.
-    pub(in crate::volume) fn kept(&self, key: ChunkKey) -> Wanted {
+    pub(in crate::volume) fn kept(&self, key: ChunkKey) -> Residency {
         match self.chunks.get(key) {
-            None => Wanted::Gone,
-            Some(Entry { role: Role::Leaf { shown, .. }, .. }) if !matches!(shown, Shown::Nothing) => Wanted::Mesh,
-            Some(_) => Wanted::Samples,
+            None => Residency::Gone,
+            Some(Entry { role: Role::Leaf { shown, .. }, .. }) if !matches!(shown, Shown::Nothing) => Residency::Mesh,
+            Some(_) => Residency::Samples,
         }
     }
 
@@ -53,7 +53,7 @@ impl ChunkTable {
     }
 
     /// The mesh of a chunk, and its entity.
-    pub(crate) fn drawn(&self, key: ChunkKey) -> Option<&Drawn> {
+    pub(crate) fn drawn(&self, key: ChunkKey) -> Option<&DrawnMesh> {
         match self.shown(key)? {
             Shown::Mesh(drawn) => Some(drawn),
             _ => None,
@@ -119,18 +119,18 @@ impl ChunkTable {
     }
 
     /// Whether a chunk is as far as it gets if no more is wanted than this.
-    pub(in crate::volume) fn has_all(&self, key: ChunkKey, wanted: Wanted) -> bool {
+    pub(in crate::volume) fn has_all(&self, key: ChunkKey, wanted: Residency) -> bool {
         let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
-        if wanted == Wanted::Mesh { is_current } else { is_loaded && !waits }
+        if wanted == Residency::Mesh { is_current } else { is_loaded && !waits }
     }
 
     /// Whether there is more of a chunk than this.
-    pub(in crate::volume) fn has_more(&self, key: ChunkKey, most: Wanted) -> bool {
+    pub(in crate::volume) fn has_more(&self, key: ChunkKey, most: Residency) -> bool {
         let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
         match most {
-            Wanted::Gone => is_loaded,
-            Wanted::Samples => is_current || waits,
-            Wanted::Mesh => false,
+            Residency::Gone => is_loaded,
+            Residency::Samples => is_current || waits,
+            Residency::Mesh => false,
         }
     }
 

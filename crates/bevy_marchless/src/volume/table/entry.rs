@@ -8,7 +8,7 @@ use marchless::MeshBuffer;
 use super::map::Marks;
 use crate::cover::LeafState;
 use crate::jobs::Ticket;
-use crate::volume::Signs;
+use crate::volume::KnownSigns;
 
 /// How many chunks of each kind there are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub(crate) struct Counts {
 pub(super) struct Entry {
     pub(super) role: Role,
     pub(super) fill: Fill,
-    pub(super) signs: Signs,
+    pub(super) signs: KnownSigns,
     pub(super) is_outdated: bool,
 }
 
@@ -51,18 +51,18 @@ pub(crate) enum Shown {
     /// There is nothing to draw, and never was.
     Empty,
     /// A mesh on an entity; an empty one, where all was dug away.
-    Mesh(Drawn),
+    Mesh(DrawnMesh),
     /// The game has despawned its entity: it is drawn no more.
     Despawned,
 }
 
 /// A mesh on an entity.
 #[derive(Clone, Debug)]
-pub(crate) struct Drawn {
+pub(crate) struct DrawnMesh {
     pub(crate) entity: Entity,
     pub(crate) geometry: Arc<MeshBuffer>,
-    /// The number of the look that it has.
-    pub(crate) look: u64,
+    /// The number of the appearance that it has.
+    pub(crate) appearance: u64,
 }
 
 /// How far the samples of a chunk are.

@@ -218,11 +218,11 @@ mod tests {
 
     use super::super::entry::{Fill, Role};
     use super::*;
-    use crate::volume::Signs;
+    use crate::volume::KnownSigns;
 
     fn entry(is_filled: bool) -> Entry {
         let fill = if is_filled { Fill::Resident } else { Fill::Queued };
-        Entry { role: Role::Support, fill, signs: Signs::UNKNOWN, is_outdated: false }
+        Entry { role: Role::Support, fill, signs: KnownSigns::UNKNOWN, is_outdated: false }
     }
 
     #[derive(Clone, Copy, Debug)]

@@ -15,6 +15,7 @@ use bevy_color::ColorToComponents as _;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
+use bevy_marchless::source::prelude::*;
 use bevy_math::{Dir3, IVec3, Ray3d, UVec3, Vec3};
 use bevy_mesh::{Mesh, Mesh3d, MeshPlugin, VertexAttributeValues};
 use bevy_transform::TransformPlugin;
@@ -38,7 +39,7 @@ pub fn app() -> App {
 /// The same without threads: so many jobs an update, always in the same order.
 pub fn app_with_budget(budget: usize) -> App {
     let mut app = app();
-    app.insert_resource(MarchlessSettings { budget: Some(budget), ..MarchlessSettings::default() });
+    app.insert_resource(MarchlessSettings { max_jobs_per_update: Some(budget), ..MarchlessSettings::default() });
     app
 }
 
@@ -134,12 +135,12 @@ pub fn assert_as_new(app: &mut App, terrain: Entity, stamps: &[Stamp]) {
 }
 
 /// A stamp as it is applied to a terrain at an isovalue.
-pub fn core_stamp(stamp: &Stamp, isovalue: f32) -> marchless::Stamp {
+pub fn core_stamp(stamp: &Stamp, isovalue: f32) -> marchless::QuantisedStamp {
     stamp.quantised().expect("numbers in range").with_isovalue(isovalue)
 }
 
 /// Asserts that what is drawn is what a new terrain of the same settings would show after these stamps. The terrain is bounded.
-pub fn assert_as_new_after(app: &mut App, terrain: Entity, stamps: &[marchless::Stamp]) {
+pub fn assert_as_new_after(app: &mut App, terrain: Entity, stamps: &[marchless::QuantisedStamp]) {
     let settings = app.world().get::<Terrain>(terrain).expect("a terrain").clone();
     let mut fresh = stream::Fresh::new(&settings);
     stamps.iter().for_each(|stamp| fresh.stamp(stamp));

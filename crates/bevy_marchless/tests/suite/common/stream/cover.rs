@@ -6,6 +6,7 @@ use bevy_app::App;
 use bevy_asset::Assets;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stream::{Coverage, LeafState};
 use bevy_math::{DVec3, IVec3};
 use bevy_mesh::{Mesh, Mesh3d};
 use bevy_transform::components::Transform;

@@ -3,14 +3,14 @@
 use std::collections::{HashMap, HashSet};
 
 use bevy_marchless::prelude::*;
-use marchless::{Chunk, Grid, MeshBuffer, MeshSettings, Mesher, Region, SpareSamples};
+use marchless::{Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Region, SamplePool};
 
 /// A plain world beside the plugin's: only the core, no entity, no task.
 pub struct Fresh {
     terrain: Terrain,
     grid: Grid<i16>,
     /// The stamps that touch a chunk that has not been sampled yet, in order.
-    stamps: HashMap<[i32; 3], Vec<marchless::Stamp>>,
+    stamps: HashMap<[i32; 3], Vec<marchless::QuantisedStamp>>,
     /// All chunks that stamps have touched.
     edited: HashSet<[i32; 3]>,
     mesher: Mesher,
@@ -29,13 +29,13 @@ impl Fresh {
         self.grid.bounds().expect("bounded")
     }
 
-    pub fn stamp(&mut self, stamp: &marchless::Stamp) {
+    pub fn stamp(&mut self, stamp: &marchless::QuantisedStamp) {
         let touched = stamp.region();
         let (low, high) = (self.grid.chunk_of(touched.min), self.grid.chunk_of(touched.max.map(|v| v - 1)));
         for position in Region::new(low, high.map(|v| v + 1)).intersection(&self.extent()).points() {
             self.edited.insert(position);
             if self.grid.chunk(position).is_some() {
-                self.grid.apply_to_chunk(position, stamp, &mut SpareSamples::new());
+                self.grid.apply_to_chunk(position, stamp, &mut SamplePool::new());
             } else {
                 self.stamps.entry(position).or_default().push(*stamp);
             }
@@ -53,14 +53,14 @@ impl Fresh {
     }
 
     /// The samples of a chunk.
-    pub fn chunk(&mut self, position: [i32; 3]) -> &Chunk<i16> {
+    pub fn chunk(&mut self, position: [i32; 3]) -> &GridChunk<i16> {
         if self.grid.chunk(position).is_none() {
             let source = self.terrain.source.get().clone();
             let spacing = f64::from(self.terrain.voxel_size);
-            let chunk = Chunk::from_source(source.as_ref(), position, self.terrain.chunk_cells, spacing);
-            self.grid.load(position, chunk).expect("a chunk of the extent");
+            let chunk = GridChunk::from_source(source.as_ref(), position, self.terrain.chunk_cells, spacing);
+            self.grid.insert_clean(position, chunk).expect("a chunk of the extent");
             for stamp in self.stamps.remove(&position).unwrap_or_default() {
-                self.grid.apply_to_chunk(position, &stamp, &mut SpareSamples::new());
+                self.grid.apply_to_chunk(position, &stamp, &mut SamplePool::new());
             }
         }
         self.grid.chunk(position).expect("it has just been put there")

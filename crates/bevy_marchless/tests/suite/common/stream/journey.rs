@@ -6,9 +6,10 @@ use std::time::Duration;
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
+use bevy_marchless::stream::LeafState;
 use bevy_math::{DVec3, IVec3, Quat, Vec3};
 use bevy_transform::components::Transform;
-use marchless::{Chunk as Samples, MeshBuffer};
+use marchless::{GridChunk as Samples, MeshBuffer};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
@@ -217,7 +218,7 @@ impl Flight {
             if volume(&self.app, self.terrain).is_settled() {
                 return updates;
             }
-            if self.app.world().resource::<MarchlessSettings>().budget.is_none() {
+            if self.app.world().resource::<MarchlessSettings>().max_jobs_per_update.is_none() {
                 std::thread::sleep(Duration::from_micros(500));
             }
         }

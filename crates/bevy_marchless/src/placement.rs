@@ -1,4 +1,4 @@
-//! [`Place`]: where terrains are in world space, in double precision.
+//! [`Placement`]: where terrains are in world space, in double precision.
 
 use bevy_ecs::query::QueryData;
 use bevy_math::DAffine3;
@@ -6,13 +6,13 @@ use bevy_transform::components::GlobalTransform;
 
 /// Where a terrain was in world space when transforms were last propagated.
 #[derive(QueryData)]
-pub(crate) struct Place {
+pub(crate) struct Placement {
     transform: &'static GlobalTransform,
     #[cfg(feature = "big_space")]
     grid: Option<&'static ::big_space::grid::Grid>,
 }
 
-impl PlaceItem<'_, '_> {
+impl PlacementItem<'_, '_> {
     /// Whether it is exact however far from the origin: then world space is relative to a floating origin, and only
     /// propagated transforms can be compared with it.
     pub(crate) fn is_floating(&self) -> bool {

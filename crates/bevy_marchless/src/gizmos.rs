@@ -1,6 +1,6 @@
-//! Draws the bounds of chunks, in colours that tell their states.
+//! [`ChunkGizmosPlugin`]: the bounds of chunks, in colours that tell their states.
 
-use bevy_app::{App, PostUpdate};
+use bevy_app::{App, Plugin, PostUpdate};
 use bevy_color::Color;
 use bevy_ecs::prelude::*;
 use bevy_gizmos::AppGizmoBuilder as _;
@@ -53,19 +53,26 @@ const EMPTY_SHARE: f32 = 0.06;
 /// A terrain with more chunks along an axis has no bounds to draw.
 const ENDLESS: u32 = 1 << 16;
 
-pub(super) fn build(app: &mut App) {
-    app.init_resource::<ShowChunkBounds>().register_type::<ShowChunkBounds>().register_type::<ChunkBoundsGizmos>();
-}
+/// Draws the bounds of chunks where [`ShowChunkBounds`] says so.
+///
+/// Needs Bevy's `GizmoPlugin`, added before or after; without it, nothing is drawn.
+#[derive(Default)]
+pub struct ChunkGizmosPlugin;
 
-/// Without Bevy's `GizmoPlugin` there is nothing to draw with.
-pub(super) fn finish(app: &mut App) {
-    if app.is_plugin_added::<GizmoPlugin>() {
-        app.init_gizmo_group::<ChunkBoundsGizmos>().add_systems(
-            PostUpdate,
-            (draw_drawn, draw_others, draw_terrains)
-                .after(TransformSystems::Propagate)
-                .run_if(|show: Res<ShowChunkBounds>| show.0),
-        );
+impl Plugin for ChunkGizmosPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<ShowChunkBounds>().register_type::<ShowChunkBounds>().register_type::<ChunkBoundsGizmos>();
+    }
+
+    fn finish(&self, app: &mut App) {
+        if app.is_plugin_added::<GizmoPlugin>() {
+            app.init_gizmo_group::<ChunkBoundsGizmos>().add_systems(
+                PostUpdate,
+                (draw_drawn, draw_others, draw_terrains)
+                    .after(TransformSystems::Propagate)
+                    .run_if(|show: Res<ShowChunkBounds>| show.0),
+            );
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! [`WorldError`]: what is wrong with a world, and where.
+//! [`DescriptionError`]: what is wrong with a world, and where.
 
 use std::io;
 
@@ -11,7 +11,7 @@ use crate::terrain::TerrainError;
 /// Why a world cannot be made, or its file not be read. Lines and columns count from 1.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum WorldError {
+pub enum DescriptionError {
     /// The file's bytes could not be read.
     #[error("the world file cannot be read: {0}")]
     Read(#[from] io::Error),
@@ -77,19 +77,19 @@ pub enum WorldError {
     },
 }
 
-impl From<SourceError> for WorldError {
+impl From<SourceError> for DescriptionError {
     fn from(error: SourceError) -> Self {
         Self::Source { error, lines: Vec::new() }
     }
 }
 
-impl From<TerrainError> for WorldError {
+impl From<TerrainError> for DescriptionError {
     fn from(error: TerrainError) -> Self {
         Self::Terrain { error, lines: Vec::new() }
     }
 }
 
-impl WorldError {
+impl DescriptionError {
     /// Bytes that are not text: after `valid` bytes that are, or cut off within a character.
     pub(super) fn from_utf8(valid: &str, cut_off: bool) -> Self {
         if cut_off { Self::cut_short(valid) } else { Self::NotText { line: valid.matches('\n').count() + 1 } }

@@ -1,4 +1,4 @@
-//! [`Piece`]: a part of what is solid that hangs together.
+//! [`Island`]: a part of what is solid that hangs together.
 
 use core::fmt;
 use std::sync::Arc;
@@ -14,17 +14,17 @@ use crate::terrain::Terrain;
 
 /// A part of what is solid in a box of a terrain that hangs together, as it was when it was found.
 #[derive(Clone)]
-pub struct Piece {
+pub struct Island {
     bounds: Region,
     first: [i32; 3],
     size: usize,
-    is_held: bool,
+    touches_boundary: bool,
     /// The whole box, and its lowest point.
     solid: Arc<BitGrid>,
     corner: [i32; 3],
 }
 
-impl Piece {
+impl Island {
     pub(super) fn new(component: Component, region: Region, solid: &Arc<BitGrid>) -> Self {
         let place = |point: [i32; 3]| [0, 1, 2].map(|axis| region.min[axis] + point[axis]);
         let bounds = Region::new(place(component.bounds.min), place(component.bounds.max));
@@ -32,7 +32,8 @@ impl Piece {
             bounds,
             first: place(component.first.map(|v| v as i32)),
             size: component.size,
-            is_held: (0..3).any(|axis| bounds.min[axis] == region.min[axis] || bounds.max[axis] == region.max[axis]),
+            touches_boundary: (0..3)
+                .any(|axis| bounds.min[axis] == region.min[axis] || bounds.max[axis] == region.max[axis]),
             solid: solid.clone(),
             corner: region.min,
         }
@@ -56,8 +57,8 @@ impl Piece {
     /// Whether it touches the border of the box in which it was found, or of the terrain, and so counts as held: it may
     /// go on beyond that box, and at the terrain's walls and bottom something must hold the ground. What is not held
     /// hangs free: it is whole, and nothing solid is next to it.
-    pub const fn is_held(&self) -> bool {
-        self.is_held
+    pub const fn touches_boundary(&self) -> bool {
+        self.touches_boundary
     }
 
     /// Its points: a grid of the size of its bounds, whose lowest point is the grid's point `[0, 0, 0]`.
@@ -86,7 +87,7 @@ impl Piece {
             if weight >= isovalue || is_own(point) {
                 return voxel;
             }
-            // Of another piece: as far outside as it is inside.
+            // Of another island: as far outside as it is inside.
             Voxel { weight: i16::from_voxels((2.0 * isovalue - weight).max(isovalue + 1.0 / 256.0)), ..voxel }
         };
         let (weights, materials) = region.points().map(voxel).map(|voxel| (voxel.weight, voxel.material)).unzip();
@@ -101,7 +102,7 @@ impl Piece {
     /// Stamps that dig it out of `terrain`, and nothing else: all its points become air, and no other point changes sides.
     /// Surfaces less than half a voxel away may move a little.
     ///
-    /// What the terrain has become since the piece was found, the stamps do not know: write them in
+    /// What the terrain has become since the island was found, the stamps do not know: write them in
     /// the same update, or ask again before.
     pub fn stamps(&self, terrain: Entity) -> Vec<Stamp> {
         let (own, mut others) = (self.bits(), self.around());
@@ -131,7 +132,7 @@ impl Piece {
     }
 }
 
-/// How many points of air a piece's samples have on each side: one for the surface, one for its normals.
+/// How many points of air a island's samples have on each side: one for the surface, one for its normals.
 const RIM: u32 = 2;
 /// The longest box that one stamp digs. [Units: voxels]
 const LONGEST_BOX: u32 = 2000;
@@ -154,19 +155,23 @@ fn shrunk(bits: &BitGrid, mut region: Region) -> Option<Region> {
     Some(region)
 }
 
-impl fmt::Debug for Piece {
+impl fmt::Debug for Island {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { bounds, first, size, is_held, .. } = self;
-        let mut debug = f.debug_struct("Piece");
-        debug.field("bounds", bounds).field("first", first).field("size", size).field("is_held", is_held);
+        let Self { bounds, first, size, touches_boundary, .. } = self;
+        let mut debug = f.debug_struct("Island");
+        debug
+            .field("bounds", bounds)
+            .field("first", first)
+            .field("size", size)
+            .field("touches_boundary", touches_boundary);
         debug.finish_non_exhaustive()
     }
 }
 
 /// Pieces are equal where their points are.
-impl PartialEq for Piece {
+impl PartialEq for Island {
     fn eq(&self, other: &Self) -> bool {
-        let summary = |piece: &Self| (piece.bounds, piece.first, piece.size, piece.is_held);
+        let summary = |island: &Self| (island.bounds, island.first, island.size, island.touches_boundary);
         summary(self) == summary(other) && self.bits() == other.bits()
     }
 }

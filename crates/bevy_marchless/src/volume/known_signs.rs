@@ -1,18 +1,18 @@
-//! [`Signs`]: which samples of a chunk are known to lie on one side of the surface.
+//! [`KnownSigns`]: which samples of a chunk are known to lie on one side of the surface.
 
-use marchless::{Chunk, Weight as _};
+use marchless::{GridChunk, Weight as _};
 
 /// Of a chunk's samples, those of its lowest layer along each axis, and all of them: on which side of the surface they
 /// lie. `true`: inside; `None`: some here and some there, or not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Signs {
+pub(crate) struct KnownSigns {
     lowest: [Option<bool>; 3],
     all: Option<bool>,
     /// What they are the signs of.
     isovalue: f32,
 }
 
-impl Signs {
+impl KnownSigns {
     pub(crate) const UNKNOWN: Self = Self { lowest: [None; 3], all: None, isovalue: 0.0 };
 
     /// The signs, if they are those of this isovalue.
@@ -21,13 +21,13 @@ impl Signs {
     }
 
     /// The signs of these samples.
-    pub(crate) fn of(chunk: &Chunk<i16>, isovalue: f32) -> Self {
+    pub(crate) fn of(chunk: &GridChunk<i16>, isovalue: f32) -> Self {
         match chunk {
-            Chunk::Uniform(voxel) => {
+            GridChunk::Uniform(voxel) => {
                 let inside = Some(voxel.weight.to_voxels() < isovalue);
                 Self { lowest: [inside; 3], all: inside, isovalue }
             }
-            Chunk::Samples(samples) => {
+            GridChunk::Samples(samples) => {
                 let weights = &samples.weights[..];
                 let cells = (1..).take_while(|n| n * n * n <= weights.len()).last().unwrap_or(0);
                 if cells == 0 {
@@ -88,7 +88,7 @@ mod tests {
             for position in all.points() {
                 grid.fill(position, &plane, 1.0).unwrap();
             }
-            let signs = |position: [i32; 3]| grid.chunk(position).map(|chunk| Signs::of(chunk, 0.0));
+            let signs = |position: [i32; 3]| grid.chunk(position).map(|chunk| KnownSigns::of(chunk, 0.0));
             let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
             for position in Region::new([0; 3], [2; 3]).points() {
                 grid.mesh_chunk(position, &mut mesher, &MeshSettings::default(), &mut mesh).unwrap();
@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn flat_ground_has_its_surface_in_one_layer_of_chunks() {
-        let signs = |y: i32| Signs::of(&Chunk::from_source(&|[_, y, _]: [f64; 3]| y - 12.0, [0, y, 0], 8, 1.0), 0.0);
+        let signs =
+            |y: i32| KnownSigns::of(&GridChunk::from_source(&|[_, y, _]: [f64; 3]| y - 12.0, [0, y, 0], 8, 1.0), 0.0);
         let without = |y: i32| signs(y).are_without_surface(|step| Some(signs(y + step[1])));
         assert_eq!([-1, 0, 1, 2, 3].map(without), [true, true, false, true, true]);
     }
@@ -116,14 +117,14 @@ mod tests {
                     weights.extend((0..n).map(|x| f(x, y, z)));
                 }
             }
-            Chunk::from_samples(weights, vec![0; n * n * n], n as u32).unwrap()
+            GridChunk::from_samples(weights, vec![0; n * n * n], n as u32).unwrap()
         };
-        let y_lowest = Signs::of(&weights(&|_, y, _| if y == 0 { -5 } else { 5 }), 0.0);
-        assert_eq!(y_lowest, Signs { lowest: [None, Some(true), None], all: None, isovalue: 0.0 });
-        let one = Signs::of(&weights(&|x, y, z| if [x, y, z] == [3, 2, 0] { -5 } else { 5 }), 0.0);
-        assert_eq!(one, Signs { lowest: [Some(false), Some(false), None], all: None, isovalue: 0.0 });
-        let none = Signs::of(&weights(&|x, _, _| 5 + x as i16), 0.0);
-        assert_eq!(none, Signs { lowest: [Some(false); 3], all: Some(false), isovalue: 0.0 });
-        assert_eq!(Signs::of(&Chunk::AIR, 0.0), none);
+        let y_lowest = KnownSigns::of(&weights(&|_, y, _| if y == 0 { -5 } else { 5 }), 0.0);
+        assert_eq!(y_lowest, KnownSigns { lowest: [None, Some(true), None], all: None, isovalue: 0.0 });
+        let one = KnownSigns::of(&weights(&|x, y, z| if [x, y, z] == [3, 2, 0] { -5 } else { 5 }), 0.0);
+        assert_eq!(one, KnownSigns { lowest: [Some(false), Some(false), None], all: None, isovalue: 0.0 });
+        let none = KnownSigns::of(&weights(&|x, _, _| 5 + x as i16), 0.0);
+        assert_eq!(none, KnownSigns { lowest: [Some(false); 3], all: Some(false), isovalue: 0.0 });
+        assert_eq!(KnownSigns::of(&GridChunk::AIR, 0.0), none);
     }
 }

@@ -5,29 +5,29 @@ use bevy_asset::{AssetLoader, LoadContext};
 use bevy_reflect::TypePath;
 
 #[cfg(feature = "png")]
-use super::WorldSource;
-use super::{WorldDescription, WorldError};
+use super::SourceDescription;
+use super::{DescriptionError, TerrainDescription};
 #[cfg(feature = "png")]
 use crate::source::{HeightMap, HeightMapSettings};
 
-/// Loads a [`WorldDescription`] from `*.world.ron`.
+/// Loads a [`TerrainDescription`] from `*.terrain.ron`.
 #[derive(Clone, Copy, Debug, Default, TypePath)]
-pub struct WorldLoader;
+pub struct DescriptionLoader;
 
-impl AssetLoader for WorldLoader {
-    type Asset = WorldDescription;
+impl AssetLoader for DescriptionLoader {
+    type Asset = TerrainDescription;
     type Settings = ();
-    type Error = WorldError;
+    type Error = DescriptionError;
 
     async fn load(
         &self,
         reader: &mut dyn Reader,
         (): &(),
         context: &mut LoadContext<'_>,
-    ) -> Result<WorldDescription, WorldError> {
+    ) -> Result<TerrainDescription, DescriptionError> {
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).await?;
-        let mut world = WorldDescription::from_bytes(&bytes)?;
+        let mut world = TerrainDescription::from_bytes(&bytes)?;
         read_picture(&mut world, context).await?;
         Ok(world)
     }
@@ -39,9 +39,9 @@ impl AssetLoader for WorldLoader {
 
 /// Reads the picture of a height map, and so makes the world depend on it.
 #[cfg(feature = "png")]
-async fn read_picture(world: &mut WorldDescription, context: &mut LoadContext<'_>) -> Result<(), WorldError> {
-    if let WorldSource::HeightMap(height_map) = &mut world.source {
-        let failed = |message: String| WorldError::Picture { picture: height_map.picture.clone(), message };
+async fn read_picture(world: &mut TerrainDescription, context: &mut LoadContext<'_>) -> Result<(), DescriptionError> {
+    if let SourceDescription::HeightMap(height_map) = &mut world.source {
+        let failed = |message: String| DescriptionError::Picture { picture: height_map.picture.clone(), message };
         let bytes = context.read_asset_bytes(&height_map.picture).await.map_err(|error| failed(error.to_string()))?;
         let map = HeightMap::from_bytes(&bytes, HeightMapSettings::default());
         height_map.map = Some(map.map_err(|error| failed(error.to_string()))?);
@@ -51,6 +51,6 @@ async fn read_picture(world: &mut WorldDescription, context: &mut LoadContext<'_
 }
 
 #[cfg(not(feature = "png"))]
-async fn read_picture(_world: &mut WorldDescription, _context: &mut LoadContext<'_>) -> Result<(), WorldError> {
+async fn read_picture(_world: &mut TerrainDescription, _context: &mut LoadContext<'_>) -> Result<(), DescriptionError> {
     Ok(())
 }

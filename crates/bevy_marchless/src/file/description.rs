@@ -1,4 +1,4 @@
-//! [`WorldDescription`]: what a world is made of, as plain data.
+//! [`TerrainDescription`]: what a world is made of, as plain data.
 
 use bevy_asset::Asset;
 use bevy_reflect::prelude::*;
@@ -7,7 +7,7 @@ use ron::extensions::Extensions;
 use ron::ser::PrettyConfig;
 use serde::{Deserialize, Serialize};
 
-use super::WorldError;
+use super::DescriptionError;
 use crate::source::{Air, Sdf};
 #[cfg(feature = "png")]
 use crate::source::{HeightMap, HeightMapSettings};
@@ -21,9 +21,9 @@ use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain};
 #[derive(Asset, Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 #[serde(deny_unknown_fields)]
-pub struct WorldDescription {
+pub struct TerrainDescription {
     /// What it is made of before it is edited. A file must name it.
-    pub source: WorldSource,
+    pub source: SourceDescription,
     /// As of [`Terrain::palette`]. Default: as of [`Palette`].
     #[serde(default)]
     pub palette: Palette,
@@ -42,7 +42,7 @@ pub struct WorldDescription {
 #[derive(Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 #[non_exhaustive]
-pub enum WorldSource {
+pub enum SourceDescription {
     /// [`Air`].
     Air,
     /// [`NoiseHeights`].
@@ -58,7 +58,7 @@ pub enum WorldSource {
     Sdf(Sdf),
     /// A [`HeightMap`].
     #[cfg(feature = "png")]
-    HeightMap(WorldHeightMap),
+    HeightMap(HeightMapDescription),
 }
 
 /// A height map of a world: which picture it is, and how its pixels become ground.
@@ -66,7 +66,7 @@ pub enum WorldSource {
 #[derive(Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 #[serde(deny_unknown_fields)]
-pub struct WorldHeightMap {
+pub struct HeightMapDescription {
     /// Where the picture is, a 16-bit greyscale PNG file: a path in `assets`, as the asset server takes it. When that
     /// file changes, the world is loaded again.
     pub picture: String,
@@ -78,9 +78,9 @@ pub struct WorldHeightMap {
     pub map: Option<HeightMap>,
 }
 
-impl WorldDescription {
+impl TerrainDescription {
     /// A world made of `source`, else as the defaults.
-    pub fn new(source: WorldSource) -> Self {
+    pub fn new(source: SourceDescription) -> Self {
         Self {
             source,
             palette: Palette::default(),
@@ -93,18 +93,18 @@ impl WorldDescription {
     /// The world that a file's text describes. Pictures are not read yet.
     ///
     /// # Errors
-    /// [`WorldError`] for text that is cut short, is no such RON, or holds settings that are out of range.
-    pub fn from_ron(text: &str) -> Result<Self, WorldError> {
-        let world: Self = options().from_str(text).map_err(|error| WorldError::from_ron(error, text))?;
+    /// [`DescriptionError`] for text that is cut short, is no such RON, or holds settings that are out of range.
+    pub fn from_ron(text: &str) -> Result<Self, DescriptionError> {
+        let world: Self = options().from_str(text).map_err(|error| DescriptionError::from_ron(error, text))?;
         world.check().map_err(|error| error.in_text(text))?;
         Ok(world)
     }
 
     /// The same of a file's bytes.
-    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, WorldError> {
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, DescriptionError> {
         let text = str::from_utf8(bytes).map_err(|error| {
             let valid = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
-            WorldError::from_utf8(&valid, error.error_len().is_none())
+            DescriptionError::from_utf8(&valid, error.error_len().is_none())
         })?;
         Self::from_ron(text)
     }
@@ -112,24 +112,24 @@ impl WorldDescription {
     /// The text of a file that describes this world.
     ///
     /// # Errors
-    /// [`WorldError::Write`] for what is nested too deeply.
-    pub fn to_ron(&self) -> Result<String, WorldError> {
+    /// [`DescriptionError::Write`] for what is nested too deeply.
+    pub fn to_ron(&self) -> Result<String, DescriptionError> {
         let pretty = PrettyConfig::new();
-        options().to_string_pretty(self, pretty).map_err(|error| WorldError::Write { message: error.to_string() })
+        options().to_string_pretty(self, pretty).map_err(|error| DescriptionError::Write { message: error.to_string() })
     }
 
     /// A terrain of this world.
     ///
     /// # Errors
-    /// [`WorldError`] for settings that are out of range and for a height map whose picture was not read.
-    pub fn terrain(&self) -> Result<Terrain, WorldError> {
+    /// [`DescriptionError`] for settings that are out of range and for a height map whose picture was not read.
+    pub fn terrain(&self) -> Result<Terrain, DescriptionError> {
         let mut terrain = Terrain::default();
         self.apply(None, &mut terrain)?;
         Ok(terrain)
     }
 
     /// Gives a terrain what differs from the world that it had `before`. Where there is an error, the terrain stays.
-    pub(super) fn apply(&self, before: Option<&Self>, terrain: &mut Terrain) -> Result<(), WorldError> {
+    pub(super) fn apply(&self, before: Option<&Self>, terrain: &mut Terrain) -> Result<(), DescriptionError> {
         let mut next = terrain.clone();
         if before.is_none_or(|before| before.source != self.source) {
             next.source = self.source.build()?;
@@ -152,22 +152,22 @@ impl WorldDescription {
     }
 
     /// Whether all settings are in their ranges; a picture may still be missing.
-    fn check(&self) -> Result<(), WorldError> {
+    fn check(&self) -> Result<(), DescriptionError> {
         #[cfg(feature = "png")]
-        if let WorldSource::HeightMap(WorldHeightMap { settings, map: None, .. }) = &self.source {
+        if let SourceDescription::HeightMap(HeightMapDescription { settings, map: None, .. }) = &self.source {
             settings.validate()?;
-            return Self { source: WorldSource::Air, ..self.clone() }.check();
+            return Self { source: SourceDescription::Air, ..self.clone() }.check();
         }
         self.terrain().map(|_| ())
     }
 }
 
-impl WorldSource {
+impl SourceDescription {
     /// The source itself.
     ///
     /// # Errors
-    /// [`WorldError`] for settings that are out of range and for a height map whose picture was not read.
-    pub fn build(&self) -> Result<SourceHandle, WorldError> {
+    /// [`DescriptionError`] for settings that are out of range and for a height map whose picture was not read.
+    pub fn build(&self) -> Result<SourceHandle, DescriptionError> {
         Ok(match self.clone() {
             Self::Air => SourceHandle::new(Air),
             #[cfg(feature = "noise")]
@@ -178,8 +178,8 @@ impl WorldSource {
             Self::Landscape(settings) => SourceHandle::new(Landscape::new(settings)?),
             Self::Sdf(shape) => SourceHandle::new(shape.validate()?),
             #[cfg(feature = "png")]
-            Self::HeightMap(WorldHeightMap { picture, settings, map }) => {
-                let map = map.ok_or(WorldError::NoPicture { picture })?;
+            Self::HeightMap(HeightMapDescription { picture, settings, map }) => {
+                let map = map.ok_or(DescriptionError::NoPicture { picture })?;
                 SourceHandle::new(map.with_settings(settings)?)
             }
         })

@@ -1,11 +1,13 @@
-//! Worlds as files: what a terrain is made of, read from `assets`, also while the game runs (feature `world_files`).
+//! Worlds as files: what a terrain is made of, read from `assets`, also while the game runs (feature `terrain_files`).
 //!
-//! A world file is [RON](https://docs.rs/ron) text whose name ends in `.world.ron`. This one is a hilly country without
+//! A world file is [RON](https://docs.rs/ron) text whose name ends in `.terrain.ron`. This one is a hilly country without
 //! end, 256 voxels high; what a file does not name has its default:
 //!
 //! ```
 //! # use bevy_marchless::prelude::*;
-//! let world = WorldDescription::from_ron("
+//! # use bevy_marchless::source::prelude::*;
+//! # use bevy_marchless::file::TerrainDescription;
+//! let world = TerrainDescription::from_ron("
 //! (
 //!     source: NoiseHeights(
 //!         noise: (seed: 7, zoom: 300.0, octaves: 6),
@@ -17,10 +19,10 @@
 //! )
 //! ")?;
 //! assert_eq!(world.extent, Extent::ENDLESS.with_y(-2..6));
-//! # Ok::<(), bevy_marchless::world::WorldError>(())
+//! # Ok::<(), bevy_marchless::file::DescriptionError>(())
 //! ```
 //!
-//! A terrain with a [`TerrainWorld`] follows such a file:
+//! A terrain with a [`TerrainFile`] follows such a file:
 //!
 //! ```
 //! use bevy_asset::AssetServer;
@@ -28,7 +30,7 @@
 //! use bevy_marchless::prelude::*;
 //!
 //! fn setup(mut commands: Commands, assets: Res<AssetServer>) {
-//!     commands.spawn(TerrainWorld(assets.load("worlds/valley.world.ron")));
+//!     commands.spawn(TerrainFile(assets.load("terrains/valley.terrain.ron")));
 //! }
 //! ```
 //!
@@ -46,7 +48,7 @@
 //! out have their defaults; unknown ones are refused. `Some` need not be written, nor the
 //! parentheses of settings inside those of a variant: `NoiseHeights(amplitude: 80.0)`. An [`Extent`](crate::terrain::Extent)
 //! names, for the axes along which it ends, the first chunk and one past the last: `(y: (-2, 6))`. Numbers may be `inf`
-//! and `-inf` where the settings allow it. [`WorldDescription::to_ron`] writes the same format.
+//! and `-inf` where the settings allow it. [`TerrainDescription::to_ron`] writes the same format.
 
 mod description;
 mod error;
@@ -59,31 +61,31 @@ use bevy_ecs::prelude::*;
 use bevy_reflect::prelude::*;
 
 #[cfg(feature = "png")]
-pub use description::WorldHeightMap;
-pub use description::{WorldDescription, WorldSource};
-pub use error::WorldError;
-pub use loader::WorldLoader;
+pub use description::HeightMapDescription;
+pub use description::{SourceDescription, TerrainDescription};
+pub use error::DescriptionError;
+pub use loader::DescriptionLoader;
 
 use crate::schedule::MarchlessSystems;
 use crate::terrain::Terrain;
 
-/// Makes its entity's [`Terrain`] what a [`WorldDescription`] says, and keeps it so when that changes.
+/// Makes its entity's [`Terrain`] what a [`TerrainDescription`] says, and keeps it so when that changes.
 ///
 /// The terrain's other settings (chunk size, isovalue, normals) stay its own.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Debug, PartialEq, Clone)]
-#[require(Terrain, follow::Followed)]
-pub struct TerrainWorld(pub Handle<WorldDescription>);
+#[require(Terrain, follow::FollowedFile)]
+pub struct TerrainFile(pub Handle<TerrainDescription>);
 
-/// Loads `*.world.ron`, and lets terrains follow their [`TerrainWorld`].
+/// Loads `*.terrain.ron`, and lets terrains follow their [`TerrainFile`].
 ///
 /// Needs Bevy's `AssetPlugin`, added before or after; without it, nothing happens.
 #[derive(Default)]
-pub struct WorldPlugin;
+pub struct TerrainFilePlugin;
 
-impl Plugin for WorldPlugin {
+impl Plugin for TerrainFilePlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<TerrainWorld>().add_observer(follow::forget_removed_world);
+        app.register_type::<TerrainFile>().add_observer(follow::forget_removed_world);
         register_asset(app);
     }
 
@@ -95,11 +97,11 @@ impl Plugin for WorldPlugin {
 /// Registers the asset and its systems, where there is an asset server and it has not been done yet.
 fn register_asset(app: &mut App) {
     let world = app.world();
-    if !world.contains_resource::<AssetServer>() || world.contains_resource::<Assets<WorldDescription>>() {
+    if !world.contains_resource::<AssetServer>() || world.contains_resource::<Assets<TerrainDescription>>() {
         return;
     }
-    app.init_asset::<WorldDescription>()
-        .register_asset_reflect::<WorldDescription>()
-        .register_asset_loader(WorldLoader)
+    app.init_asset::<TerrainDescription>()
+        .register_asset_reflect::<TerrainDescription>()
+        .register_asset_loader(DescriptionLoader)
         .add_systems(PostUpdate, (follow::follow_worlds, follow::report_failures).before(MarchlessSystems::Work));
 }

@@ -1,4 +1,4 @@
-//! [`Range`]: the chunks within a distance, row by row.
+//! [`LoadRegion`]: the chunks within a distance, row by row.
 
 use core::ops;
 
@@ -11,7 +11,7 @@ const MOST_RINGS: u32 = 64;
 
 /// Chunks: a box, or those that an ellipsoid reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Range {
+pub(crate) struct LoadRegion {
     /// The middle, in chunks from the lattice's origin. For a box, half way between its corners.
     middle: [f64; 3],
     /// Half of its axes, in chunks.
@@ -22,7 +22,7 @@ pub(crate) struct Range {
     extent: Region,
 }
 
-impl Range {
+impl LoadRegion {
     /// The chunks of `extent` of which some point lies in the ellipsoid.
     pub(crate) fn ellipsoid(middle: [f64; 3], radii: [f64; 3], extent: Region) -> Self {
         Self { middle, radii, is_box: false, extent }
@@ -41,8 +41,8 @@ impl Range {
     ///
     /// That is exact for the ellipsoid, too: of a chunk's neighbours, the one that is nearest along each axis is a neighbour.
     #[must_use]
-    pub(crate) fn grown(self, chunks: f64) -> Grown {
-        Grown { range: self, by: chunks }
+    pub(crate) fn grown(self, chunks: f64) -> GrownLoadRegion {
+        GrownLoadRegion { range: self, by: chunks }
     }
 
     /// The same range, wider by so many chunks.
@@ -82,14 +82,14 @@ impl Range {
     }
 }
 
-/// A [`Range`] grown by some chunks.
+/// A [`LoadRegion`] grown by some chunks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Grown {
-    range: Range,
+pub(crate) struct GrownLoadRegion {
+    range: LoadRegion,
     by: f64,
 }
 
-impl Grown {
+impl GrownLoadRegion {
     pub(crate) fn contains(&self, position: [i32; 3]) -> bool {
         let [x, y, z] = position;
         self.range.extent.contains(position) && self.row(y, z).contains(&x)
@@ -162,11 +162,11 @@ fn floor(value: f64) -> i32 {
 /// What one viewer sees, and what of it stays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
-    pub(crate) range: Range,
+    pub(crate) range: LoadRegion,
     /// How many chunks farther away chunks stay.
     pub(crate) margin: f64,
     /// Within this range samples stay; `None`: everywhere.
-    pub(crate) samples: Option<Range>,
+    pub(crate) samples: Option<LoadRegion>,
     /// Where it looks, in the terrain's space; zero where that is not known.
     pub(crate) forward: [f64; 3],
     /// A box around all that it asks for.
@@ -174,7 +174,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    pub(crate) fn new(range: Range, margin: f64, samples: Option<Range>, forward: [f64; 3]) -> Self {
+    pub(crate) fn new(range: LoadRegion, margin: f64, samples: Option<LoadRegion>, forward: [f64; 3]) -> Self {
         let all = [Some(range.widened(margin).grown(1.0)), samples.map(|samples| samples.widened(margin).grown(0.0))];
         let bounds = all.into_iter().flatten().map(|grown| grown.bounds());
         let bounds = bounds.reduce(|a, b| a.union(&b)).unwrap_or(Region::new([0; 3], [0; 3]));
@@ -184,7 +184,7 @@ impl View {
     /// The same view of a terrain with another extent.
     #[must_use]
     pub(crate) fn with_extent(self, extent: Region) -> Self {
-        let of = |range: Range| Range { extent, ..range };
+        let of = |range: LoadRegion| LoadRegion { extent, ..range };
         Self::new(of(self.range), self.margin, self.samples.map(of), self.forward)
     }
 
@@ -200,7 +200,7 @@ impl View {
     }
 
     /// Where chunks stay that are drawn.
-    pub(crate) fn with_margin(&self) -> Range {
+    pub(crate) fn with_margin(&self) -> LoadRegion {
         self.range.widened(self.margin)
     }
 
@@ -232,7 +232,7 @@ impl View {
 
     /// The part of its radii that reaches about a chunk farther than `part`; 1: to the end of all that there is of it.
     pub(super) fn next_ring(&self, part: f64) -> f64 {
-        let Range { middle, radii, .. } = self.range;
+        let LoadRegion { middle, radii, .. } = self.range;
         let there = self.range.grown(0.0).bounds();
         if there.is_empty() {
             return 1.0;
@@ -256,7 +256,7 @@ impl View {
     /// Whether it differs from another one by a few steps of a viewer, so that few chunks differ.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 2.0);
-        let are_near = |a: &Range, b: &Range| {
+        let are_near = |a: &LoadRegion, b: &LoadRegion| {
             near(a.middle, b.middle) && near(a.radii, b.radii) && (a.is_box, a.extent) == (b.is_box, b.extent)
         };
         let have_near_samples = match (&self.samples, &other.samples) {
@@ -292,15 +292,15 @@ mod tests {
         EXTENT.grown(2, 2).points()
     }
 
-    fn range() -> impl Strategy<Value = Range> {
+    fn range() -> impl Strategy<Value = LoadRegion> {
         let ellipsoid = (prop::array::uniform3(-5.0..5.0f64), prop::array::uniform3(0.1..5.0f64))
-            .prop_map(|(middle, radii)| Range::ellipsoid(middle, radii, EXTENT));
+            .prop_map(|(middle, radii)| LoadRegion::ellipsoid(middle, radii, EXTENT));
         let boxed = (prop::array::uniform3(-6..6i32), prop::array::uniform3(0..5i32))
-            .prop_map(|(min, size)| Range::of_box(Region::new(min, [0, 1, 2].map(|i| min[i] + size[i])), EXTENT));
+            .prop_map(|(min, size)| LoadRegion::of_box(Region::new(min, [0, 1, 2].map(|i| min[i] + size[i])), EXTENT));
         prop_oneof![ellipsoid, boxed]
     }
 
-    fn set(grown: &Grown) -> BTreeSet<[i32; 3]> {
+    fn set(grown: &GrownLoadRegion) -> BTreeSet<[i32; 3]> {
         all().filter(|position| grown.contains(*position)).collect()
     }
 
@@ -319,7 +319,7 @@ mod tests {
             middle in prop::array::uniform3(-5.0..5.0f64),
             radii in prop::array::uniform3(0.1..5.0f64),
         ) {
-            let range = Range::ellipsoid(middle, radii, EXTENT);
+            let range = LoadRegion::ellipsoid(middle, radii, EXTENT);
             for position in all() {
                 let nearest = [0, 1, 2].map(|i| middle[i].clamp(position[i].into(), f64::from(position[i]) + 1.0));
                 let size: f64 = (0..3).map(|i| ((nearest[i] - middle[i]) / radii[i]).powi(2)).sum();
@@ -349,7 +349,7 @@ mod tests {
             range in range(),
             is_ellipsoid: bool,
         ) {
-            let range = if is_ellipsoid { Range::ellipsoid(middle, radii, EXTENT) } else { range };
+            let range = if is_ellipsoid { LoadRegion::ellipsoid(middle, radii, EXTENT) } else { range };
             let view = View::new(range, 1.0, None, [0.0; 3]);
             let (mut part, mut rings) = (0.0, 0);
             while part < 1.0 {
@@ -364,7 +364,7 @@ mod tests {
         fn a_box_holds_its_chunks(min in prop::array::uniform3(-9..9i32), size in prop::array::uniform3(0..6i32)) {
             let chunks = Region::new(min, [0, 1, 2].map(|i| min[i] + size[i]));
             let expected: BTreeSet<_> = chunks.intersection(&EXTENT).points().collect();
-            prop_assert_eq!(set(&Range::of_box(chunks, EXTENT).grown(0.0)), expected);
+            prop_assert_eq!(set(&LoadRegion::of_box(chunks, EXTENT).grown(0.0)), expected);
         }
     }
 }

@@ -9,8 +9,10 @@ use bevy_app::{App, TaskPoolPlugin};
 use bevy_asset::{AssetPlugin, AssetServer, Assets, Handle, LoadState};
 use bevy_ecs::prelude::*;
 use bevy_log::tracing_subscriber;
+use bevy_marchless::file::{HeightMapDescription, TerrainFilePlugin};
+use bevy_marchless::file::{SourceDescription, TerrainDescription};
 use bevy_marchless::prelude::*;
-use bevy_marchless::world::{WorldHeightMap, WorldPlugin};
+use bevy_marchless::source::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_mesh::MeshPlugin;
 use bevy_transform::TransformPlugin;
@@ -43,13 +45,13 @@ impl Game {
     /// A terrain of a world file, loaded and drawn.
     fn spawn(&mut self, name: &str) -> Entity {
         let handle = self.server().load(name.to_owned());
-        let entity = self.app.world_mut().spawn(TerrainWorld(handle)).id();
+        let entity = self.app.world_mut().spawn(TerrainFile(handle)).id();
         self.loaded(entity);
         entity
     }
 
-    fn handle(&self, entity: Entity) -> Handle<WorldDescription> {
-        self.app.world().get::<TerrainWorld>(entity).unwrap().0.clone()
+    fn handle(&self, entity: Entity) -> Handle<TerrainDescription> {
+        self.app.world().get::<TerrainFile>(entity).unwrap().0.clone()
     }
 
     fn terrain(&self, entity: Entity) -> &Terrain {
@@ -125,7 +127,7 @@ fn warnings(name: &str) -> Vec<String> {
         log.with_max_level(tracing_subscriber::filter::LevelFilter::WARN).init();
     });
     let text = String::from_utf8_lossy(&TEXT.lock().unwrap()).into_owned();
-    let of_file = text.lines().filter(|line| line.contains("WARN bevy_marchless::world") && line.contains(name));
+    let of_file = text.lines().filter(|line| line.contains("WARN bevy_marchless::file") && line.contains(name));
     of_file.map(str::to_owned).collect()
 }
 
@@ -139,7 +141,7 @@ fn ball_text(radius: f64, more: &str) -> String {
 #[test]
 fn a_world_is_loaded_and_followed() {
     let mut game = Game::new();
-    let name = "followed.world.ron";
+    let name = "followed.terrain.ron";
     game.write(name, ball_text(10.0, "voxel_size: 1.0"));
     let entity = game.spawn(name);
     assert_eq!(game.terrain(entity).extent, UVec3::splat(2).into());
@@ -164,7 +166,7 @@ fn a_world_is_loaded_and_followed() {
 #[test]
 fn only_what_differs_changes() {
     let mut game = Game::new();
-    let name = "palette.world.ron";
+    let name = "palette.terrain.ron";
     game.write(name, ball_text(12.0, ""));
     let entity = game.spawn(name);
     game.dig(entity);
@@ -188,11 +190,11 @@ fn only_what_differs_changes() {
     let again = format!("// Another text.\n{}", ball_text(12.0, palette));
     game.write(name, &again);
     let mut reader =
-        game.app.world().resource::<Messages<bevy_asset::AssetEvent<WorldDescription>>>().get_cursor_current();
+        game.app.world().resource::<Messages<bevy_asset::AssetEvent<TerrainDescription>>>().get_cursor_current();
     game.server().reload(name);
     let reader = Mutex::new(&mut reader);
     update_until(&mut game.app, |app| {
-        let events = app.world().resource::<Messages<bevy_asset::AssetEvent<WorldDescription>>>();
+        let events = app.world().resource::<Messages<bevy_asset::AssetEvent<TerrainDescription>>>();
         reader.lock().unwrap().read(events).next().is_some()
     });
     game.drawn(entity);
@@ -204,7 +206,7 @@ fn only_what_differs_changes() {
 #[test]
 fn a_file_that_is_no_good_changes_nothing_and_is_told_once() {
     let mut game = Game::new();
-    let name = "broken.world.ron";
+    let name = "broken.terrain.ron";
     let good = ball_text(12.0, "");
     game.write(name, &good);
     warnings(name);
@@ -226,7 +228,7 @@ fn a_file_that_is_no_good_changes_nothing_and_is_told_once() {
 
     // Repaired: the same world as before.
     game.rewrite(name, &good, entity, |app| {
-        app.world().resource::<AssetServer>().is_loaded(&app.world().get::<TerrainWorld>(entity).unwrap().0)
+        app.world().resource::<AssetServer>().is_loaded(&app.world().get::<TerrainFile>(entity).unwrap().0)
     });
     assert_eq!(game.geometry(entity), dug);
     // And changed, and broken in the way that was told before.
@@ -240,17 +242,17 @@ fn a_file_that_is_no_good_changes_nothing_and_is_told_once() {
 #[test]
 fn a_file_that_is_not_there_is_told_and_may_come_later() {
     let mut game = Game::new();
-    let name = "late.world.ron";
+    let name = "late.terrain.ron";
     warnings(name);
     let handle = game.server().load(name);
-    let entity = game.app.world_mut().spawn((ground(), TerrainWorld(handle))).id();
+    let entity = game.app.world_mut().spawn((ground(), TerrainFile(handle))).id();
     settle(&mut game.app, entity);
     update_until(&mut game.app, |_| !warnings(name).is_empty());
     assert_drawn(&mut game.app, entity);
     assert_eq!(game.terrain(entity).chunk_cells, 16);
     game.rewrite(name, ball_text(10.0, ""), entity, |app| {
         app.world().get::<Terrain>(entity).unwrap().extent == UVec3::splat(2).into()
-            && app.world().resource::<Assets<WorldDescription>>().len() == 1
+            && app.world().resource::<Assets<TerrainDescription>>().len() == 1
     });
     assert_eq!(game.terrain(entity).chunk_cells, 16, "what a world does not say stays");
     assert_drawn(&mut game.app, entity);
@@ -260,21 +262,21 @@ fn a_file_that_is_not_there_is_told_and_may_come_later() {
 #[test]
 fn a_terrain_outlives_its_world() {
     let mut game = Game::new();
-    let name = "gone.world.ron";
+    let name = "gone.terrain.ron";
     game.write(name, ball_text(12.0, ""));
     let entity = game.spawn(name);
     let other = game.spawn(name);
     game.dig(entity);
     let dug = game.geometry(entity);
     let handle = game.handle(entity);
-    game.app.world_mut().resource_mut::<Assets<WorldDescription>>().remove(&handle);
+    game.app.world_mut().resource_mut::<Assets<TerrainDescription>>().remove(&handle);
     game.drawn(entity);
     assert_eq!(game.geometry(entity), dug);
     game.app.world_mut().despawn(other);
-    game.app.world_mut().entity_mut(entity).remove::<TerrainWorld>();
+    game.app.world_mut().entity_mut(entity).remove::<TerrainFile>();
     drop(handle);
     game.drawn(entity);
-    assert_eq!(game.app.world().resource::<Assets<WorldDescription>>().len(), 0);
+    assert_eq!(game.app.world().resource::<Assets<TerrainDescription>>().len(), 0);
     assert_eq!(game.geometry(entity), dug);
     assert!(warnings(name).is_empty());
 }
@@ -282,24 +284,24 @@ fn a_terrain_outlives_its_world() {
 #[test]
 fn worlds_can_be_changed_in_code() {
     let mut game = Game::new();
-    let mut world = WorldDescription::from_ron(&ball_text(12.0, "")).unwrap();
-    let handle = game.app.world_mut().resource_mut::<Assets<WorldDescription>>().add(world.clone());
-    let entity = game.app.world_mut().spawn(TerrainWorld(handle.clone())).id();
+    let mut world = TerrainDescription::from_ron(&ball_text(12.0, "")).unwrap();
+    let handle = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>().add(world.clone());
+    let entity = game.app.world_mut().spawn(TerrainFile(handle.clone())).id();
     game.drawn(entity);
     assert_drawn(&mut game.app, entity);
     let before = game.geometry(entity);
     assert!(before.iter().any(|(_, mesh)| !mesh.is_empty()));
 
-    let change = |game: &mut Game, world: &WorldDescription| {
-        let mut worlds = game.app.world_mut().resource_mut::<Assets<WorldDescription>>();
+    let change = |game: &mut Game, world: &TerrainDescription| {
+        let mut worlds = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>();
         *worlds.get_mut(&handle).unwrap() = world.clone();
         drop(worlds);
         game.drawn(entity);
     };
     warnings("code");
-    world.source = WorldSource::Sdf(Sdf::sphere([30.0; 3], f64::NAN));
+    world.source = SourceDescription::Sdf(Sdf::sphere([30.0; 3], f64::NAN));
     change(&mut game, &world);
-    world.source = WorldSource::HeightMap(WorldHeightMap {
+    world.source = SourceDescription::HeightMap(HeightMapDescription {
         picture: "code.png".into(),
         settings: HeightMapSettings::default(),
         map: None,
@@ -307,7 +309,7 @@ fn worlds_can_be_changed_in_code() {
     change(&mut game, &world);
     assert_eq!(warnings("code.png").len(), 1);
     assert_eq!(game.geometry(entity), before, "a bad world changes nothing");
-    world.source = WorldSource::Air;
+    world.source = SourceDescription::Air;
     change(&mut game, &world);
     assert!(game.geometry(entity).iter().all(|(_, mesh)| mesh.is_empty()));
 }
@@ -315,7 +317,7 @@ fn worlds_can_be_changed_in_code() {
 #[test]
 fn a_height_map_is_read_with_its_world() {
     let mut game = Game::new();
-    let name = "map.world.ron";
+    let name = "map.terrain.ron";
     let text = "(source: HeightMap(picture: \"heights.png\", settings: (metres_per_unit: 0.001, floor: 20.0)),
         extent: (x: (0, 1), y: (0, 2), z: (0, 1)))";
     warnings(name);
@@ -357,30 +359,30 @@ fn grey_png(width: u32, height: u32, sample: impl Fn(u32, u32) -> u16) -> Vec<u8
 #[test]
 fn the_plugin_does_nothing_without_assets_and_may_come_before_them() {
     let mut app = bare_app();
-    let entity = app.world_mut().spawn((ground(), TerrainWorld::default())).id();
+    let entity = app.world_mut().spawn((ground(), TerrainFile::default())).id();
     settle(&mut app, entity);
     let mut app = App::new();
-    app.add_plugins(WorldPlugin);
+    app.add_plugins(TerrainFilePlugin);
     app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default()));
     app.finish();
-    assert!(app.world().contains_resource::<Assets<WorldDescription>>());
+    assert!(app.world().contains_resource::<Assets<TerrainDescription>>());
 }
 
 #[test]
 fn stamps_wait_for_a_world_that_is_being_read() {
-    let world = WorldDescription::new(WorldSource::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
-    let world = WorldDescription { extent: UVec3::splat(2).into(), ..world };
+    let world = TerrainDescription::new(SourceDescription::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
+    let world = TerrainDescription { extent: UVec3::splat(2).into(), ..world };
     let mut game = Game::new();
-    game.write("a.world.ron", world.to_ron().unwrap());
-    game.write("bad.world.ron", "(");
+    game.write("a.terrain.ron", world.to_ron().unwrap());
+    game.write("bad.terrain.ron", "(");
     let at = Vec3::new(20.0, 14.0, 20.0);
     let dig = |terrain| Stamp::dig(terrain, BrushShape::sphere(at, 5.0));
     // A new terrain, and one that is to become another.
     let former = game.app.world_mut().spawn(ground_of_rock()).id();
     settle(&mut game.app, former);
     for entity in [game.app.world_mut().spawn_empty().id(), former] {
-        let handle = game.server().load("a.world.ron");
-        game.app.world_mut().entity_mut(entity).insert(TerrainWorld(handle));
+        let handle = game.server().load("a.terrain.ron");
+        game.app.world_mut().entity_mut(entity).insert(TerrainFile(handle));
         game.app.world_mut().write_message(dig(entity));
         game.app.update();
         assert!(!volume(&game.app, entity).is_settled());
@@ -388,13 +390,13 @@ fn stamps_wait_for_a_world_that_is_being_read() {
         assert_as_new(&mut game.app, entity, &[dig(entity)]);
     }
     // A file that is no good makes nobody wait for ever, nor does one that is taken away.
-    let handle = game.server().load("bad.world.ron");
-    game.app.world_mut().entity_mut(former).insert(TerrainWorld(handle));
+    let handle = game.server().load("bad.terrain.ron");
+    game.app.world_mut().entity_mut(former).insert(TerrainFile(handle));
     game.app.world_mut().write_message(Stamp::add(former, BrushShape::sphere(at, 5.0), 2));
     update_until(&mut game.app, |app| volume(app, former).is_settled());
     assert_as_new(&mut game.app, former, &[dig(former), Stamp::add(former, BrushShape::sphere(at, 5.0), 2)]);
-    let handle = game.server().load("b.world.ron");
-    game.app.world_mut().entity_mut(former).insert(TerrainWorld(handle)).remove::<TerrainWorld>();
+    let handle = game.server().load("b.terrain.ron");
+    game.app.world_mut().entity_mut(former).insert(TerrainFile(handle)).remove::<TerrainFile>();
     game.app.world_mut().write_message(dig(former));
     update_until(&mut game.app, |app| volume(app, former).is_settled());
 }

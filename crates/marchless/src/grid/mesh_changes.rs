@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::border::Border;
-use super::{Chunk, Grid};
+use super::{Grid, GridChunk};
 use crate::bits::BitGrid;
 use crate::lattice::{Region, Samples, Shape};
 use crate::mesher::{MeshSettings, Topology};
@@ -27,13 +27,14 @@ impl<W: Weight> Grid<W> {
     /// rest, all that has changed is too far from the surface, as it is and as it was, to show.
     ///
     /// `changed`: a box around the changed samples. `before`: every chunk that holds some of them, as it was
-    /// ([`Chunk::AIR`], where it was absent). `settings`: of the meshes.
+    /// ([`GridChunk::AIR`], where it was absent). `settings`: of the meshes.
     ///
     /// `None` where that is not looked into: for boxes of more than 60 points along an axis, isovalues that are not
     /// finite, and isovalues that are extreme or beyond the weights' range at the border of a bounded grid.
-    pub fn chunks_redrawn(
+    #[doc(hidden)]
+    pub fn chunks_with_mesh_changes(
         &self,
-        before: &BTreeMap<[i32; 3], Chunk<W>>,
+        before: &BTreeMap<[i32; 3], GridChunk<W>>,
         changed: Region,
         settings: &MeshSettings,
     ) -> Option<BTreeSet<[i32; 3]>> {
@@ -53,17 +54,17 @@ impl<W: Weight> Grid<W> {
         let signs = BitGrid::from_samples(Samples::new(shape, &weights).ok()?, settings.isovalue).ok()?;
         let now = signs.words();
         let mut rows = Rows { read, now, before: now.to_vec(), changed: vec![0; now.len()] };
-        let air = Chunk::AIR;
+        let air = GridChunk::AIR;
         for (position, old) in before {
             let new = self.chunk(*position).unwrap_or(&air);
             rows.compare(old, new, self.chunk_region(*position), changed, threshold, border);
         }
         let shows = rows.shows(changed, settings.topology);
-        let is_redrawn = |position: &[i32; 3]| {
+        let has_changed = |position: &[i32; 3]| {
             let meshed = self.chunk_region(*position).grown(0, 1).intersection(&changed.grown(1, 1));
             rows.rows_of(meshed).any(|(row, _, mask)| shows[row] & mask != 0)
         };
-        Some(self.chunks_affected_by(changed).points().filter(is_redrawn).collect())
+        Some(self.chunks_affected_by(changed).points().filter(has_changed).collect())
     }
 
     /// The weights of a box, x fastest; outside where the border lets no surface be. Elsewhere it changes no sign.
@@ -80,11 +81,11 @@ impl<W: Weight> Grid<W> {
                     let start = dx as usize + along_y * dy as usize + along_z * dz as usize;
                     let row = &mut weights[start..start + part.size()[0] as usize];
                     match chunk {
-                        Some(Chunk::Samples(samples)) => {
+                        Some(GridChunk::Samples(samples)) => {
                             let from = self.index([part.min[0], y, z]);
                             row.copy_from_slice(&samples.weights[from..from + row.len()]);
                         }
-                        Some(Chunk::Uniform(voxel)) => row.fill(voxel.weight),
+                        Some(GridChunk::Uniform(voxel)) => row.fill(voxel.weight),
                         None => {}
                     }
                     for (weight, x) in row.iter_mut().zip(part.min[0]..) {
@@ -113,8 +114,8 @@ impl Rows<'_> {
     /// Notes what has changed in one chunk, whose points are `chunk`, within a box.
     fn compare<W: Weight>(
         &mut self,
-        old: &Chunk<W>,
-        new: &Chunk<W>,
+        old: &GridChunk<W>,
+        new: &GridChunk<W>,
         chunk: Region,
         within: Region,
         threshold: W::Threshold,
@@ -201,13 +202,13 @@ impl Rows<'_> {
 /// The weights and the materials of a chunk's samples in a row of at most 64, where they are; those of a uniform chunk
 /// are written to `room`.
 fn row_of<'a, W: Weight>(
-    chunk: &'a Chunk<W>,
+    chunk: &'a GridChunk<W>,
     indices: Range<usize>,
     room: &'a mut ([W; 64], [u8; 64]),
 ) -> (&'a [W], &'a [u8]) {
     match chunk {
-        Chunk::Samples(samples) => (&samples.weights[indices.clone()], &samples.materials[indices]),
-        Chunk::Uniform(voxel) => {
+        GridChunk::Samples(samples) => (&samples.weights[indices.clone()], &samples.materials[indices]),
+        GridChunk::Uniform(voxel) => {
             let (weights, materials) = (&mut room.0[..indices.len()], &mut room.1[..indices.len()]);
             weights.fill(voxel.weight);
             materials.fill(voxel.material);
@@ -221,7 +222,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::brush::{BrushShape, Operation, Stamp};
+    use crate::brush::{Operation, QuantisedShape, QuantisedStamp};
     use crate::{MeshBuffer, Mesher, Voxel};
 
     const CELLS: u32 = 8;
@@ -245,15 +246,15 @@ mod tests {
         grid
     }
 
-    fn stamp() -> impl Strategy<Value = Stamp> {
+    fn stamp() -> impl Strategy<Value = QuantisedStamp> {
         let place = || prop::array::uniform3(-10.0..18.0f64);
         let shape = prop_oneof![
-            (place(), 0.5..7.0f64).prop_map(|(center, radius)| BrushShape::sphere(center, radius).unwrap()),
+            (place(), 0.5..7.0f64).prop_map(|(center, radius)| QuantisedShape::sphere(center, radius).unwrap()),
             (place(), prop::array::uniform3(0.5..6.0f64))
-                .prop_map(|(center, half)| BrushShape::cuboid(center, half).unwrap()),
+                .prop_map(|(center, half)| QuantisedShape::cuboid(center, half).unwrap()),
         ];
         let operation = prop_oneof![Just(Operation::Dig), Just(Operation::Add), Just(Operation::Paint)];
-        (shape, operation).prop_map(|(shape, operation)| Stamp::new(shape, operation, 3))
+        (shape, operation).prop_map(|(shape, operation)| QuantisedStamp::new(shape, operation, 3))
     }
 
     fn mesh(grid: &Grid, position: [i32; 3], settings: &MeshSettings) -> MeshBuffer {
@@ -262,7 +263,7 @@ mod tests {
         mesh
     }
 
-    fn chunks(grid: &Grid) -> BTreeMap<[i32; 3], Chunk> {
+    fn chunks(grid: &Grid) -> BTreeMap<[i32; 3], GridChunk> {
         grid.chunks().map(|(position, chunk)| (position, chunk.clone())).collect()
     }
 
@@ -280,16 +281,16 @@ mod tests {
             let affected = after.chunks_affected_by(changed);
             let mut old = chunks(&before);
             for position in affected.points() {
-                old.entry(position).or_insert(Chunk::AIR);
+                old.entry(position).or_insert(GridChunk::AIR);
             }
             let topology = if exact { Topology::Trilinear } else { Topology::Separated };
             let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
-            let redrawn = after.chunks_redrawn(&old, changed, &settings);
-            prop_assert!(redrawn.is_some());
+            let changed_meshes = after.chunks_with_mesh_changes(&old, changed, &settings);
+            prop_assert!(changed_meshes.is_some());
             for position in affected.points() {
                 let looks_the_same = || mesh(&before, position, &settings) == mesh(&after, position, &settings);
-                let is_redrawn = redrawn.as_ref().is_none_or(|redrawn| redrawn.contains(&position));
-                prop_assert!(is_redrawn || looks_the_same(), "chunk {:?}", position);
+                let has_changed = changed_meshes.as_ref().is_none_or(|changed_meshes| changed_meshes.contains(&position));
+                prop_assert!(has_changed || looks_the_same(), "chunk {:?}", position);
             }
         }
     }
@@ -312,12 +313,12 @@ mod tests {
                 let mut after = before.clone();
                 after.set(point, Voxel::new(before.get(point).weight - 9, 2)).unwrap();
                 let changed = Region::new(point, point).grown(0, 1);
-                let redrawn = after.chunks_redrawn(&old, changed, &settings).unwrap();
+                let changed_meshes = after.chunks_with_mesh_changes(&old, changed, &settings).unwrap();
                 for (position, mesh_before) in Region::new([-1; 3], [1; 3]).points().zip(&meshes) {
-                    let is_redrawn = redrawn.contains(&position);
-                    *if is_redrawn { &mut shown } else { &mut hidden } += 1;
+                    let has_changed = changed_meshes.contains(&position);
+                    *if has_changed { &mut shown } else { &mut hidden } += 1;
                     assert!(
-                        is_redrawn || mesh(&after, position, &settings) == *mesh_before,
+                        has_changed || mesh(&after, position, &settings) == *mesh_before,
                         "{ground:?}, {point:?}, chunk {position:?}"
                     );
                 }
@@ -334,21 +335,24 @@ mod tests {
             grid.fill(position, &|[_, y, _]: [f64; 3]| y - 6.5, 1.0).unwrap();
         }
         let (before, settings) = (chunks(&grid), MeshSettings::default());
-        let ball = BrushShape::sphere([8.0, 6.5, 8.0], 3.0).unwrap();
-        let changed = grid.apply(&Stamp::new(ball, Operation::Dig, 0)).region;
+        let ball = QuantisedShape::sphere([8.0, 6.5, 8.0], 3.0).unwrap();
+        let changed = grid.apply(&QuantisedStamp::new(ball, Operation::Dig, 0)).region;
         let affected = grid.chunks_affected_by(changed).points().count();
-        assert_eq!(grid.chunks_redrawn(&before, changed, &settings), Some(BTreeSet::from([[0; 3]])));
+        assert_eq!(grid.chunks_with_mesh_changes(&before, changed, &settings), Some(BTreeSet::from([[0; 3]])));
         assert!(affected > 1, "{affected}");
         assert_eq!(
-            grid.chunks_redrawn(&chunks(&grid), changed, &settings),
+            grid.chunks_with_mesh_changes(&chunks(&grid), changed, &settings),
             Some(BTreeSet::new()),
             "nothing has changed"
         );
         let not_finite = MeshSettings { isovalue: f32::NAN, ..settings };
-        assert_eq!(grid.chunks_redrawn(&before, changed, &not_finite), None);
-        assert_eq!(grid.chunks_redrawn(&before, Region::new([0; 3], [61, 1, 1]), &settings), None);
-        assert_eq!(grid.chunks_redrawn(&before, Region::new([0; 3], [0; 3]), &settings), Some(BTreeSet::new()));
+        assert_eq!(grid.chunks_with_mesh_changes(&before, changed, &not_finite), None);
+        assert_eq!(grid.chunks_with_mesh_changes(&before, Region::new([0; 3], [61, 1, 1]), &settings), None);
+        assert_eq!(
+            grid.chunks_with_mesh_changes(&before, Region::new([0; 3], [0; 3]), &settings),
+            Some(BTreeSet::new())
+        );
         let ends = Region::new([i32::MIN; 3], [i32::MIN + 1; 3]);
-        assert_eq!(grid.chunks_redrawn(&before, ends, &settings), None);
+        assert_eq!(grid.chunks_with_mesh_changes(&before, ends, &settings), None);
     }
 }

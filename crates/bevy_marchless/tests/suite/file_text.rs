@@ -2,14 +2,16 @@
 
 use std::fmt::Debug;
 
+use bevy_marchless::file::{DescriptionError, HeightMapDescription};
+use bevy_marchless::file::{SourceDescription, TerrainDescription};
 use bevy_marchless::prelude::*;
-use bevy_marchless::world::{WorldError, WorldHeightMap};
+use bevy_marchless::source::prelude::*;
 use bevy_math::{DVec2, DVec3, IVec3};
 use proptest::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-const EXAMPLE: &str = include_str!("../../../../assets/worlds/highlands.world.ron");
+const EXAMPLE: &str = include_str!("../../../../assets/terrains/highlands.terrain.ron");
 
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![-1e3..1e3, Just(0.0), Just(0.1), Just(1e-9), Just(-1e9)]
@@ -134,7 +136,7 @@ fn landscape() -> impl Strategy<Value = LandscapeSettings> {
     (solid(), prop::collection::vec(rule, 0..3)).prop_map(|(solid, materials)| LandscapeSettings { solid, materials })
 }
 
-fn height_map() -> impl Strategy<Value = WorldHeightMap> {
+fn height_map() -> impl Strategy<Value = HeightMapDescription> {
     let settings = (length(), length(), prop::option::of(number()), strata()).prop_map(|(x, y, floor, strata)| {
         HeightMapSettings {
             metres_per_pixel: DVec2::splat(x),
@@ -145,7 +147,7 @@ fn height_map() -> impl Strategy<Value = WorldHeightMap> {
             ..HeightMapSettings::default()
         }
     });
-    (".*", settings).prop_map(|(picture, settings)| WorldHeightMap { picture, settings, map: None })
+    (".*", settings).prop_map(|(picture, settings)| HeightMapDescription { picture, settings, map: None })
 }
 
 fn extent() -> impl Strategy<Value = Extent> {
@@ -160,20 +162,20 @@ fn keep() -> impl Strategy<Value = Keep> {
     prop_oneof![Just(Keep::Nothing), extent().prop_map(Keep::Chunks), Just(Keep::Everything)]
 }
 
-fn world() -> impl Strategy<Value = WorldDescription> {
+fn world() -> impl Strategy<Value = TerrainDescription> {
     let source = prop_oneof![
-        Just(WorldSource::Air),
-        heights().prop_map(WorldSource::NoiseHeights),
-        density().prop_map(WorldSource::NoiseDensity),
-        landscape().prop_map(WorldSource::Landscape),
-        sdf().prop_map(WorldSource::Sdf),
-        height_map().prop_map(WorldSource::HeightMap),
+        Just(SourceDescription::Air),
+        heights().prop_map(SourceDescription::NoiseHeights),
+        density().prop_map(SourceDescription::NoiseDensity),
+        landscape().prop_map(SourceDescription::Landscape),
+        sdf().prop_map(SourceDescription::Sdf),
+        height_map().prop_map(SourceDescription::HeightMap),
     ];
     let color = prop::array::uniform4(0f32..1.0).prop_map(|[r, g, b, a]| bevy_color::Color::srgba(r, g, b, a));
     let color = prop_oneof![color, Just(bevy_color::Color::hsl(20.0, 0.5, 0.5))];
     let palette = prop::collection::vec(color, 0..3).prop_map(Palette::new);
     (source, palette, 1e-3f32..1e3, extent(), keep()).prop_map(|(source, palette, voxel_size, extent, keep)| {
-        WorldDescription { source, palette, voxel_size, extent, keep }
+        TerrainDescription { source, palette, voxel_size, extent, keep }
     })
 }
 
@@ -189,13 +191,13 @@ proptest! {
     #[test]
     fn what_is_written_is_read_again(world in world()) {
         let text = world.to_ron().unwrap();
-        match WorldDescription::from_ron(&text) {
+        match TerrainDescription::from_ron(&text) {
             Ok(read) => {
                 prop_assert_eq!(&read, &world);
                 prop_assert_eq!(read.to_ron().unwrap(), text);
             }
             // Whatever could not be a terrain's settings is refused after it is read.
-            Err(WorldError::Source { .. } | WorldError::Terrain { .. }) => round_trip(&world),
+            Err(DescriptionError::Source { .. } | DescriptionError::Terrain { .. }) => round_trip(&world),
             Err(error) => panic!("{error} in {text}"),
         }
     }
@@ -232,24 +234,24 @@ fn what_is_left_out_has_its_default() {
     check::<Palette>();
     check::<TerrainViewer>();
     assert_eq!(
-        WorldDescription::from_ron("(source: NoiseHeights())").unwrap(),
-        WorldDescription::new(WorldSource::NoiseHeights(NoiseHeightsSettings::default()))
+        TerrainDescription::from_ron("(source: NoiseHeights())").unwrap(),
+        TerrainDescription::new(SourceDescription::NoiseHeights(NoiseHeightsSettings::default()))
     );
     assert_eq!(
         ron::from_str::<Sdf>("Sphere(center: (1, 2, 3), radius: 4)").unwrap(),
         Sdf::sphere([1.0, 2.0, 3.0], 4.0)
     );
-    let terrain = WorldDescription::new(WorldSource::Air).terrain().unwrap();
+    let terrain = TerrainDescription::new(SourceDescription::Air).terrain().unwrap();
     assert_eq!((terrain.extent, terrain.keep), (Terrain::default().extent, Keep::Everything));
 }
 
 #[test]
 fn short_forms_are_read() {
-    let world = WorldDescription::from_ron(
+    let world = TerrainDescription::from_ron(
         "(source: NoiseDensity(ground: (base: 40.0)), extent: (y: (-2, 6)), keep: Chunks(x: (0, 1), y: (0, 1), z: (0, 1)))",
     );
     let world = world.unwrap();
-    let WorldSource::NoiseDensity(NoiseDensitySettings { ground: Some(ground), .. }) = &world.source else {
+    let SourceDescription::NoiseDensity(NoiseDensitySettings { ground: Some(ground), .. }) = &world.source else {
         panic!("{world:?}")
     };
     assert_eq!(ground.base, 40.0);
@@ -274,8 +276,8 @@ fn wrong_text_is_refused_where_it_is_wrong() {
         ("(source: Air) # comment", (1, 15), "after"),
         ("{source: Air}", (1, 1), "("),
     ] {
-        match WorldDescription::from_ron(text) {
-            Err(WorldError::Text { line, column, message }) => {
+        match TerrainDescription::from_ron(text) {
+            Err(DescriptionError::Text { line, column, message }) => {
                 assert!(message.contains(word), "{message:?} about {text}");
                 assert_eq!((line, column), place, "{message:?} about {text}");
             }
@@ -295,10 +297,10 @@ fn settings_out_of_range_are_refused_with_their_lines() {
         ("(source: Sdf(Sphere(center: (0, 0, 0),\n radius: -1)))", &[2], "line 2: a sphere's radius"),
         ("(source: HeightMap(picture: \"x.png\",\n settings: (exaggeration: -3.25)))", &[2], "exaggeration"),
     ] {
-        match WorldDescription::from_ron(text) {
-            Err(WorldError::Source { lines: found, error }) => {
+        match TerrainDescription::from_ron(text) {
+            Err(DescriptionError::Source { lines: found, error }) => {
                 assert_eq!(found, lines, "{error} about {text}");
-                let message = WorldError::Source { lines: found, error }.to_string();
+                let message = DescriptionError::Source { lines: found, error }.to_string();
                 assert!(message.contains(words), "{message:?} about {text}");
             }
             other => panic!("{other:?} about {text}"),
@@ -309,10 +311,10 @@ fn settings_out_of_range_are_refused_with_their_lines() {
         ("(source: Air, extent: (y: (0, 4)))", &[], "keep"),
         ("(source: Air, extent: (y: (4, 4)), keep: Nothing)", &[], "extent"),
     ] {
-        match WorldDescription::from_ron(text) {
-            Err(WorldError::Terrain { lines: found, error }) => {
+        match TerrainDescription::from_ron(text) {
+            Err(DescriptionError::Terrain { lines: found, error }) => {
                 assert_eq!(found, lines, "{error} about {text}");
-                let message = WorldError::Terrain { lines: found, error }.to_string();
+                let message = DescriptionError::Terrain { lines: found, error }.to_string();
                 assert!(message.contains(words), "{message:?} about {text}");
             }
             other => panic!("{other:?} about {text}"),
@@ -322,15 +324,18 @@ fn settings_out_of_range_are_refused_with_their_lines() {
 
 #[test]
 fn a_file_that_is_cut_short_anywhere_says_so() {
-    WorldDescription::from_ron(EXAMPLE).unwrap();
+    TerrainDescription::from_ron(EXAMPLE).unwrap();
     let other = "(source: HeightMap(picture: \"a b(\\\"\", settings: (floor: -inf, strata: [(above_height: -inf)])),
         /* a /* nested */ comment */ keep: Chunks(y: (-2, 0x10)), // the end
         voxel_size: 1.5e-3, palette: (colors: []))";
-    assert!(!matches!(WorldDescription::from_ron(other), Err(WorldError::Text { .. } | WorldError::CutShort { .. })));
+    assert!(!matches!(
+        TerrainDescription::from_ron(other),
+        Err(DescriptionError::Text { .. } | DescriptionError::CutShort { .. })
+    ));
     for text in [EXAMPLE.trim_end(), other] {
         for end in (0..text.len()).filter(|end| text.is_char_boundary(*end)) {
-            match WorldDescription::from_ron(&text[..end]) {
-                Err(WorldError::CutShort { line, .. }) => {
+            match TerrainDescription::from_ron(&text[..end]) {
+                Err(DescriptionError::CutShort { line, .. }) => {
                     assert_eq!(line, text[..end].trim_end().matches('\n').count() + 1);
                 }
                 other => panic!("{other:?} about the first {end} bytes: {:?}", &text[..end]),
@@ -342,10 +347,13 @@ fn a_file_that_is_cut_short_anywhere_says_so() {
 #[test]
 fn a_world_nested_without_end_is_refused() {
     let deep = format!("(source: Landscape(solid: {}))", "Union([".repeat(5_000));
-    assert!(matches!(WorldDescription::from_ron(&deep), Err(WorldError::Text { .. })));
+    assert!(matches!(TerrainDescription::from_ron(&deep), Err(DescriptionError::Text { .. })));
     let mut shape = Sdf::sphere([0.0; 3], 1.0);
     for _ in 0..300 {
         shape = Sdf::Union(vec![shape]);
     }
-    assert!(matches!(WorldDescription::new(WorldSource::Sdf(shape)).to_ron(), Err(WorldError::Write { .. })));
+    assert!(matches!(
+        TerrainDescription::new(SourceDescription::Sdf(shape)).to_ron(),
+        Err(DescriptionError::Write { .. })
+    ));
 }

@@ -8,24 +8,27 @@ use bevy_ecs::entity_disabling::Disabled;
 use bevy_ecs::prelude::*;
 use bevy_ecs::query::Allow;
 
-use super::{TerrainWorld, WorldDescription, WorldError};
+use super::{DescriptionError, TerrainDescription, TerrainFile};
 use crate::terrain::{Terrain, TerrainVolume};
 
 /// What is known of a terrain's world.
 #[derive(Component, Default)]
-pub(super) struct Followed {
+pub(super) struct FollowedFile {
     /// The world that the terrain was made last.
-    world: Option<WorldDescription>,
+    world: Option<TerrainDescription>,
     /// Whether the terrain is to be another one, whose file has not been read yet.
     is_loading: bool,
 }
 
 /// Gives terrains, disabled ones too, what has changed in their worlds. Stamps on a terrain wait while its file is being read.
 pub(super) fn follow_worlds(
-    mut terrains: Query<(Entity, Ref<TerrainWorld>, &mut Terrain, &mut TerrainVolume, &mut Followed), Allow<Disabled>>,
-    worlds: Res<Assets<WorldDescription>>,
+    mut terrains: Query<
+        (Entity, Ref<TerrainFile>, &mut Terrain, &mut TerrainVolume, &mut FollowedFile),
+        Allow<Disabled>,
+    >,
+    worlds: Res<Assets<TerrainDescription>>,
     server: Res<AssetServer>,
-    mut events: MessageReader<AssetEvent<WorldDescription>>,
+    mut events: MessageReader<AssetEvent<TerrainDescription>>,
 ) {
     let changed: HashSet<_> = events
         .read()
@@ -57,20 +60,20 @@ pub(super) fn follow_worlds(
 
 /// Without its world a terrain waits for nothing.
 pub(super) fn forget_removed_world(
-    removed: On<Remove, TerrainWorld>,
-    mut terrains: Query<(&mut TerrainVolume, &mut Followed), Allow<Disabled>>,
+    removed: On<Remove, TerrainFile>,
+    mut terrains: Query<(&mut TerrainVolume, &mut FollowedFile), Allow<Disabled>>,
 ) {
     if let Ok((mut volume, mut followed)) = terrains.get_mut(removed.entity) {
         volume.set_loading(false);
-        *followed = Followed::default();
+        *followed = FollowedFile::default();
     }
 }
 
 /// Tells once of each world file that could not be loaded.
 pub(super) fn report_failures(
-    terrains: Query<&TerrainWorld>,
+    terrains: Query<&TerrainFile>,
     server: Res<AssetServer>,
-    mut reported: Local<HashMap<AssetId<WorldDescription>, (Arc<AssetLoadError>, String)>>,
+    mut reported: Local<HashMap<AssetId<TerrainDescription>, (Arc<AssetLoadError>, String)>>,
 ) {
     let used: HashSet<_> = terrains.iter().map(|world| world.0.id()).collect();
     reported.retain(|id, _| used.contains(id));
@@ -99,7 +102,7 @@ pub(super) fn report_failures(
 /// The file and what is wrong with it, in one line, without a backtrace.
 fn describe(error: &AssetLoadError) -> String {
     if let AssetLoadError::AssetLoaderError(loading) = error
-        && let Some(error) = loading.error().downcast_ref::<WorldError>()
+        && let Some(error) = loading.error().downcast_ref::<DescriptionError>()
     {
         return format!("world '{}' cannot be loaded: {error}", loading.path());
     }

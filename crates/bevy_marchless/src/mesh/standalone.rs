@@ -13,12 +13,12 @@ use bevy_transform::components::Transform;
 use marchless::{MeshSettings, Samples, SamplesError, Shape, ShapeError, Weight};
 use thiserror::Error;
 
-use super::Screen;
+use super::MeshPresenter;
 use super::job::mesh_with;
 use crate::chunk::ChunkGeometry;
 use crate::jobs::{Priority, Results, Ticket, WorkQueue};
 use crate::terrain::Palette;
-use crate::volume::Meshed;
+use crate::volume::ChunkMesh;
 
 /// Samples of your own: insert them on any entity, and their mesh appears, and again after each change.
 ///
@@ -28,6 +28,7 @@ use crate::volume::Meshed;
 ///
 /// ```
 /// use bevy_marchless::prelude::*;
+/// use bevy_marchless::mesh::ChunkSamples;
 /// # use bevy_ecs::prelude::*;
 /// # use bevy_math::UVec3;
 ///
@@ -42,7 +43,7 @@ use crate::volume::Meshed;
 #[reflect(Component, Default, Debug, Clone)]
 #[require(ChunkGeometry, Transform, Visibility, NoAutoAabb, MeshingState)]
 pub struct ChunkSamples {
-    data: Shared,
+    data: SharedSamples,
     /// The surface lies where the weight equals this many voxels; finite. Default 0.
     pub isovalue: f32,
     /// Whether the mesh has normals. Default true.
@@ -56,7 +57,7 @@ pub struct ChunkSamples {
 #[reflect(opaque)]
 #[reflect(Default, Debug, Clone)]
 #[cfg_attr(feature = "serde", reflect(Serialize, Deserialize))]
-struct Shared(Arc<Data>);
+struct SharedSamples(Arc<Data>);
 
 #[derive(Debug)]
 struct Data {
@@ -66,7 +67,7 @@ struct Data {
     materials: Vec<u8>,
 }
 
-impl Shared {
+impl SharedSamples {
     fn new(shape: UVec3, weights: Vec<i16>, materials: Vec<u8>) -> Result<Self, ChunkSamplesError> {
         if shape.min_element() < 2 {
             return Err(ChunkSamplesError::TooSmall { found: shape });
@@ -81,7 +82,7 @@ impl Shared {
 }
 
 /// Air.
-impl Default for Shared {
+impl Default for SharedSamples {
     fn default() -> Self {
         Self::new(UVec3::splat(2), vec![i16::MAX; 8], Vec::new()).expect("8 weights of 2 × 2 × 2 samples")
     }
@@ -89,10 +90,10 @@ impl Default for Shared {
 
 /// Samples as they are written: shape, weights and materials.
 #[cfg(feature = "serde")]
-type Written = (UVec3, Vec<i16>, Vec<u8>);
+type SerializedSamples = (UVec3, Vec<i16>, Vec<u8>);
 
 #[cfg(feature = "serde")]
-impl serde::Serialize for Shared {
+impl serde::Serialize for SharedSamples {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let Data { shape, weights, materials } = &*self.0;
         (UVec3::from(shape.size()), weights, materials).serialize(serializer)
@@ -100,9 +101,9 @@ impl serde::Serialize for Shared {
 }
 
 #[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Shared {
+impl<'de> serde::Deserialize<'de> for SharedSamples {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let (shape, weights, materials) = Written::deserialize(deserializer)?;
+        let (shape, weights, materials) = SerializedSamples::deserialize(deserializer)?;
         Self::new(shape, weights, materials).map_err(serde::de::Error::custom)
     }
 }
@@ -113,7 +114,7 @@ impl ChunkSamples {
     /// # Errors
     /// [`ChunkSamplesError`] where an axis has fewer than 2 samples or the length is not the shape's.
     pub fn new(shape: UVec3, weights: Vec<i16>) -> Result<Self, ChunkSamplesError> {
-        Ok(Self { data: Shared::new(shape, weights, Vec::new())?, ..Self::default() })
+        Ok(Self { data: SharedSamples::new(shape, weights, Vec::new())?, ..Self::default() })
     }
 
     /// The same from signed distances in voxels, rounded to 1/256 and saturated at ±128 voxels.
@@ -132,7 +133,7 @@ impl ChunkSamples {
         let data = &self.data.0;
         Samples::new(data.shape, &data.weights)?.with_materials(&materials)?;
         let data = Data { shape: data.shape, weights: data.weights.clone(), materials };
-        Ok(Self { data: Shared(Arc::new(data)), ..self })
+        Ok(Self { data: SharedSamples(Arc::new(data)), ..self })
     }
 
     /// Samples per axis.
@@ -151,10 +152,10 @@ impl ChunkSamples {
     }
 
     /// The job that meshes the samples as they are now.
-    fn mesh_job(&self, screen: &Screen) -> impl FnOnce() -> Meshed + Send + 'static {
-        let Shared(data) = self.data.clone();
+    fn mesh_job(&self, presenter: &MeshPresenter) -> impl FnOnce() -> ChunkMesh + Send + 'static {
+        let SharedSamples(data) = self.data.clone();
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
-        let style = screen.style(&Arc::new(self.palette.to_vertex_colors()));
+        let style = presenter.style(&Arc::new(self.palette.to_vertex_colors()));
         move || {
             let zeros;
             let materials = if data.materials.is_empty() {
@@ -174,7 +175,7 @@ impl ChunkSamples {
 /// Air, of 2 × 2 × 2 samples.
 impl Default for ChunkSamples {
     fn default() -> Self {
-        Self { data: Shared::default(), isovalue: 0.0, normals: true, palette: Palette::default() }
+        Self { data: SharedSamples::default(), isovalue: 0.0, normals: true, palette: Palette::default() }
     }
 }
 
@@ -204,16 +205,16 @@ pub(super) struct MeshingState {
     /// Whether these samples are still to be meshed.
     changed: bool,
     /// The job that meshes an earlier state, and where it leaves the mesh; that is shown, and the newest comes next.
-    job: Option<(Ticket, Results<Meshed>)>,
+    job: Option<(Ticket, Results<ChunkMesh>)>,
 }
 
 /// Meshes changed samples: small ones at once, others in jobs, one at a time for each entity.
 pub(super) fn mesh_samples(
     mut chunks: Query<(Entity, Ref<ChunkSamples>, &mut MeshingState)>,
     queue: Res<WorkQueue>,
-    mut screen: Screen,
+    mut presenter: MeshPresenter,
 ) {
-    let mut cells_left = screen.settings.inline_chunks.saturating_mul(32 * 32 * 32);
+    let mut cells_left = presenter.settings.max_inline_chunks.saturating_mul(32 * 32 * 32);
     for (entity, samples, mut state) in &mut chunks {
         let changed_at = samples.last_changed();
         if state.seen == Some(changed_at) && !state.changed && state.job.is_none() {
@@ -223,16 +224,16 @@ pub(super) fn mesh_samples(
         state.changed |= state.seen.replace(changed_at) != Some(changed_at);
         if let Some(meshed) = state.job.as_ref().and_then(|(_, results)| results.take().pop()) {
             state.job = None;
-            show(entity, &samples, meshed, &mut screen);
+            show(entity, &samples, meshed, &mut presenter);
         }
         if !state.changed || state.job.is_some() {
             continue;
         }
         state.changed = false;
-        let job = samples.mesh_job(&screen);
+        let job = samples.mesh_job(&presenter);
         if samples.weights().len() <= cells_left {
             cells_left -= samples.weights().len();
-            show(entity, &samples, job(), &mut screen);
+            show(entity, &samples, job(), &mut presenter);
         } else {
             let results = Results::default();
             let made = results.clone();
@@ -241,9 +242,9 @@ pub(super) fn mesh_samples(
     }
 }
 
-fn show(entity: Entity, samples: &ChunkSamples, meshed: Meshed, screen: &mut Screen) {
-    screen.stats.count_mesh(meshed.time);
-    screen.show(entity, meshed, (samples.shape() - 1).to_array());
+fn show(entity: Entity, samples: &ChunkSamples, meshed: ChunkMesh, presenter: &mut MeshPresenter) {
+    presenter.stats.count_mesh(meshed.time);
+    presenter.show(entity, meshed, (samples.shape() - 1).to_array());
 }
 
 /// Without samples there is nothing to draw.

@@ -1,4 +1,4 @@
-//! [`MeshRooms`]: memory for the meshes that edits show at once.
+//! [`MeshPool`]: memory for the meshes that edits show at once.
 
 use core::hint::black_box;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,9 +10,9 @@ use marchless::MeshBuffer;
 /// Memory that tasks have prepared for the meshes that edits show at once: new memory has to be mapped page by page when
 /// it is first written to, which can take longer than all else. At most 7 MB.
 #[derive(Resource, Clone, Default)]
-pub(crate) struct MeshRooms(Arc<Mutex<[Vec<MeshRoom>; SIZES]>>);
+pub(crate) struct MeshPool(Arc<Mutex<[Vec<PooledMesh>; SIZES]>>);
 
-/// The vertices of a mesh for which the smallest rooms are, each size being twice the one before.
+/// The vertices of a mesh for which the smallest pool are, each size being twice the one before.
 const SMALLEST: usize = 256;
 /// Larger meshes are rare, and take long anyway.
 const SIZES: usize = 5;
@@ -23,14 +23,14 @@ const INDICES_PER_VERTEX: usize = 6;
 
 /// Memory for a chunk's mesh and its asset. What is not there is allocated when it is needed.
 #[derive(Debug, Default)]
-pub(crate) struct MeshRoom {
+pub(crate) struct PooledMesh {
     pub(crate) geometry: MeshBuffer,
-    pub(crate) asset: AssetRoom,
+    pub(crate) asset: PooledAsset,
 }
 
 /// Memory for the parts of a mesh asset.
 #[derive(Debug, Default)]
-pub(crate) struct AssetRoom {
+pub(crate) struct PooledAsset {
     pub(crate) positions: Vec<[f32; 3]>,
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) colors: Vec<[f32; 4]>,
@@ -38,12 +38,12 @@ pub(crate) struct AssetRoom {
     pub(crate) indices: Vec<u16>,
 }
 
-impl MeshRooms {
-    /// A room in which a mesh fits, at most four times as large as needed; or an empty one, where none is prepared.
-    pub(crate) fn room_for(&self, mesh: &MeshBuffer) -> MeshRoom {
+impl MeshPool {
+    /// A pooled in which a mesh fits, at most four times as large as needed; or an empty one, where none is prepared.
+    pub(crate) fn take_for(&self, mesh: &MeshBuffer) -> PooledMesh {
         let least = size(mesh);
-        let mut rooms = self.lock();
-        let mut fitting = rooms.iter_mut().skip(least).take(2).filter_map(Vec::pop);
+        let mut pool = self.lock();
+        let mut fitting = pool.iter_mut().skip(least).take(2).filter_map(Vec::pop);
         if mesh.is_empty() { None } else { fitting.next() }.unwrap_or_default()
     }
 
@@ -52,34 +52,34 @@ impl MeshRooms {
     pub(crate) fn prepare<'a>(&self, meshes: impl Iterator<Item = &'a MeshBuffer>, assets: bool) {
         let Some(largest) = meshes.filter(|mesh| !mesh.is_empty()).max_by_key(|mesh| size(mesh)) else { return };
         let last = size(largest).min(SIZES - 1);
-        let Some(pool) = AsyncComputeTaskPool::try_get() else { return };
-        if self.lock()[..=last].iter().all(|rooms| rooms.len() >= OF_EACH) {
+        let Some(tasks) = AsyncComputeTaskPool::try_get() else { return };
+        if self.lock()[..=last].iter().all(|pool| pool.len() >= OF_EACH) {
             return;
         }
-        let (rooms, normals, materials) = (self.clone(), !largest.normals.is_empty(), !largest.materials.is_empty());
+        let (pool, normals, materials) = (self.clone(), !largest.normals.is_empty(), !largest.materials.is_empty());
         let prepare = async move {
             for size in 0..=last {
-                while rooms.lock()[size].len() < OF_EACH {
-                    let room = MeshRoom::new(SMALLEST << size, normals, materials, assets);
-                    rooms.lock()[size].push(room);
+                while pool.lock()[size].len() < OF_EACH {
+                    let pooled = PooledMesh::new(SMALLEST << size, normals, materials, assets);
+                    pool.lock()[size].push(pooled);
                 }
             }
         };
-        pool.spawn(prepare).detach();
+        tasks.spawn(prepare).detach();
     }
 
-    fn lock(&self) -> MutexGuard<'_, [Vec<MeshRoom>; SIZES]> {
+    fn lock(&self) -> MutexGuard<'_, [Vec<PooledMesh>; SIZES]> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The index of the smallest rooms in which a mesh fits; it may be out of range.
+/// The index of the smallest pool in which a mesh fits; it may be out of range.
 fn size(mesh: &MeshBuffer) -> usize {
     let vertices = mesh.positions.len().max(mesh.indices.len().div_ceil(INDICES_PER_VERTEX));
     vertices.div_ceil(SMALLEST).next_power_of_two().ilog2() as usize
 }
 
-impl MeshRoom {
+impl PooledMesh {
     /// Room for so many vertices, all of which has been written to.
     fn new(vertices: usize, normals: bool, materials: bool, assets: bool) -> Self {
         let indices = INDICES_PER_VERTEX * vertices;
@@ -90,7 +90,7 @@ impl MeshRoom {
             indices: written(indices, true),
             bounds: None,
         };
-        let asset = AssetRoom {
+        let asset = PooledAsset {
             positions: written(vertices, assets),
             normals: written(vertices, assets && normals),
             colors: written(vertices, assets && materials),
@@ -101,16 +101,16 @@ impl MeshRoom {
     }
 }
 
-/// An empty vector with room for so many items that has been written to, or without room where none is wanted.
+/// An empty vector with pooled for so many items that has been written to, or without pooled where none is wanted.
 fn written<T: Copy + Default>(items: usize, wanted: bool) -> Vec<T> {
-    let mut room = Vec::new();
+    let mut pooled = Vec::new();
     if wanted {
-        room.reserve_exact(items);
+        pooled.reserve_exact(items);
         // Nobody is to know that the items are zeros, for those could be had without writing.
-        room.resize(items, black_box(T::default()));
-        room.clear();
+        pooled.resize(items, black_box(T::default()));
+        pooled.clear();
     }
-    room
+    pooled
 }
 
 #[cfg(test)]
@@ -127,8 +127,8 @@ mod tests {
         }
     }
 
-    fn capacities(room: &MeshRoom) -> [usize; 9] {
-        let MeshRoom { geometry, asset } = room;
+    fn capacities(pooled: &PooledMesh) -> [usize; 9] {
+        let PooledMesh { geometry, asset } = pooled;
         [
             geometry.positions.capacity(),
             geometry.normals.capacity(),
@@ -142,48 +142,48 @@ mod tests {
         ]
     }
 
-    /// Prepares rooms, and waits until there are this many of each size.
-    fn prepare(rooms: &MeshRooms, meshes: &[MeshBuffer], assets: bool, there: [usize; SIZES]) {
+    /// Prepares pool, and waits until there are this many of each size.
+    fn prepare(pool: &MeshPool, meshes: &[MeshBuffer], assets: bool, there: [usize; SIZES]) {
         AsyncComputeTaskPool::get_or_init(Default::default);
-        rooms.prepare(meshes.iter(), assets);
-        while rooms.lock().each_ref().map(Vec::len) != there {
+        pool.prepare(meshes.iter(), assets);
+        while pool.lock().each_ref().map(Vec::len) != there {
             std::thread::yield_now();
         }
     }
 
     #[test]
     fn rooms_are_prepared_up_to_the_size_of_the_largest_mesh() {
-        let rooms = MeshRooms::default();
-        assert_eq!(capacities(&rooms.room_for(&mesh(100))), [0; 9], "nothing is prepared");
-        prepare(&rooms, &[mesh(10), mesh(300), mesh(1), mesh(0)], true, [8, 8, 0, 0, 0]);
-        let room = rooms.room_for(&mesh(256));
-        assert_eq!(capacities(&room), [256, 256, 256, 6 * 256, 256, 256, 256, 256, 6 * 256]);
-        assert!(room.geometry.is_empty() && room.asset.positions.is_empty());
-        assert_eq!(rooms.room_for(&mesh(257)).geometry.positions.capacity(), 512);
+        let pool = MeshPool::default();
+        assert_eq!(capacities(&pool.take_for(&mesh(100))), [0; 9], "nothing is prepared");
+        prepare(&pool, &[mesh(10), mesh(300), mesh(1), mesh(0)], true, [8, 8, 0, 0, 0]);
+        let pooled = pool.take_for(&mesh(256));
+        assert_eq!(capacities(&pooled), [256, 256, 256, 6 * 256, 256, 256, 256, 256, 6 * 256]);
+        assert!(pooled.geometry.is_empty() && pooled.asset.positions.is_empty());
+        assert_eq!(pool.take_for(&mesh(257)).geometry.positions.capacity(), 512);
         assert_eq!(
-            rooms.room_for(&MeshBuffer { indices: vec![0; 1537], ..mesh(256) }).asset.indices.capacity(),
+            pool.take_for(&MeshBuffer { indices: vec![0; 1537], ..mesh(256) }).asset.indices.capacity(),
             6 * 512
         );
-        assert_eq!(capacities(&rooms.room_for(&mesh(0))), [0; 9]);
-        assert_eq!(capacities(&rooms.room_for(&mesh(513))), [0; 9], "nothing that large");
+        assert_eq!(capacities(&pool.take_for(&mesh(0))), [0; 9]);
+        assert_eq!(capacities(&pool.take_for(&mesh(513))), [0; 9], "nothing that large");
         for _ in 1..OF_EACH {
-            rooms.room_for(&mesh(10));
+            pool.take_for(&mesh(10));
         }
-        assert_eq!(rooms.room_for(&mesh(10)).geometry.positions.capacity(), 512, "the next size");
-        prepare(&rooms, &[mesh(5000)], true, [8; SIZES]);
-        assert_eq!(capacities(&rooms.room_for(&mesh(4097))), [0; 9]);
-        rooms.lock()[0].clear();
+        assert_eq!(pool.take_for(&mesh(10)).geometry.positions.capacity(), 512, "the next size");
+        prepare(&pool, &[mesh(5000)], true, [8; SIZES]);
+        assert_eq!(capacities(&pool.take_for(&mesh(4097))), [0; 9]);
+        pool.lock()[0].clear();
         for taken in 0..OF_EACH {
-            assert_eq!(rooms.room_for(&mesh(10)).geometry.positions.capacity(), 512, "{taken}");
+            assert_eq!(pool.take_for(&mesh(10)).geometry.positions.capacity(), 512, "{taken}");
         }
-        assert_eq!(capacities(&rooms.room_for(&mesh(10))), [0; 9], "the others would be too large");
+        assert_eq!(capacities(&pool.take_for(&mesh(10))), [0; 9], "the others would be too large");
     }
 
     #[test]
     fn what_meshes_lack_is_not_prepared() {
-        let rooms = MeshRooms::default();
+        let pool = MeshPool::default();
         let bare = MeshBuffer { normals: Vec::new(), materials: Vec::new(), ..mesh(9) };
-        prepare(&rooms, &[bare], false, [8, 0, 0, 0, 0]);
-        assert_eq!(capacities(&rooms.room_for(&mesh(9))), [256, 0, 0, 6 * 256, 0, 0, 0, 0, 0]);
+        prepare(&pool, &[bare], false, [8, 0, 0, 0, 0]);
+        assert_eq!(capacities(&pool.take_for(&mesh(9))), [256, 0, 0, 6 * 256, 0, 0, 0, 0, 0]);
     }
 }

@@ -1,27 +1,22 @@
-//! [`DebugPlugin`]: diagnostics, and gizmos for the bounds of chunks.
-
-#[cfg(feature = "gizmos")]
-mod gizmos;
+//! [`TerrainDiagnosticsPlugin`]: figures in Bevy's `DiagnosticsStore`.
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic as _};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
-#[cfg(feature = "gizmos")]
-pub use gizmos::{ChunkBoundsGizmos, ShowChunkBounds};
 
 use crate::budget::FrameBudget;
 use crate::chunk::ChunkGeometry;
 use crate::mesh::geometry_bytes;
-use crate::schedule::Phase;
+use crate::schedule::UpdatePhase;
 use crate::stats::TerrainStats;
 use crate::terrain::TerrainVolume;
 
-/// Measures the plugin's work in Bevy's `DiagnosticsStore`, and with the feature `gizmos` draws the bounds of chunks.
+/// Measures the plugin's work in Bevy's `DiagnosticsStore`.
 #[derive(Default)]
-pub struct DebugPlugin;
+pub struct TerrainDiagnosticsPlugin;
 
-impl DebugPlugin {
+impl TerrainDiagnosticsPlugin {
     /// How many chunks have something to draw.
     pub const CHUNKS: DiagnosticPath = DiagnosticPath::const_new("marchless/chunks");
     /// How many triangles they have in all.
@@ -47,7 +42,7 @@ impl DebugPlugin {
     pub const BYTES_PER_SURFACE_CHUNK: DiagnosticPath = DiagnosticPath::const_new("marchless/bytes_per_surface_chunk");
 }
 
-impl Plugin for DebugPlugin {
+impl Plugin for TerrainDiagnosticsPlugin {
     fn build(&self, app: &mut App) {
         for (path, suffix) in [
             (Self::CHUNKS, ""),
@@ -64,27 +59,24 @@ impl Plugin for DebugPlugin {
         ] {
             app.register_diagnostic(Diagnostic::new(path).with_suffix(suffix));
         }
-        app.init_resource::<Drawn>().add_observer(add_geometry).add_observer(take_away_geometry);
-        app.add_systems(PostUpdate, measure.in_set(Phase::Report));
-        #[cfg(feature = "gizmos")]
-        gizmos::build(app);
-    }
-
-    #[cfg(feature = "gizmos")]
-    fn finish(&self, app: &mut App) {
-        gizmos::finish(app);
+        app.init_resource::<GeometryTotals>().add_observer(add_geometry).add_observer(take_away_geometry);
+        app.add_systems(PostUpdate, measure.in_set(UpdatePhase::Report));
     }
 }
 
 /// What is drawn, in all.
 #[derive(Resource, Default)]
-struct Drawn {
+struct GeometryTotals {
     chunks: u32,
     triangles: usize,
     bytes: usize,
 }
 
-fn add_geometry(insert: On<Insert, ChunkGeometry>, geometries: Query<&ChunkGeometry>, mut drawn: ResMut<Drawn>) {
+fn add_geometry(
+    insert: On<Insert, ChunkGeometry>,
+    geometries: Query<&ChunkGeometry>,
+    mut drawn: ResMut<GeometryTotals>,
+) {
     if let Ok(ChunkGeometry { mesh }) = geometries.get(insert.entity)
         && !mesh.is_empty()
     {
@@ -97,7 +89,7 @@ fn add_geometry(insert: On<Insert, ChunkGeometry>, geometries: Query<&ChunkGeome
 fn take_away_geometry(
     discard: On<Discard, ChunkGeometry>,
     geometries: Query<&ChunkGeometry>,
-    mut drawn: ResMut<Drawn>,
+    mut drawn: ResMut<GeometryTotals>,
 ) {
     if let Ok(ChunkGeometry { mesh }) = geometries.get(discard.entity)
         && !mesh.is_empty()
@@ -147,7 +139,7 @@ impl Sweep {
 
 fn measure(
     volumes: Query<(Entity, &TerrainVolume)>,
-    drawn: Res<Drawn>,
+    drawn: Res<GeometryTotals>,
     mut sweep: Local<Sweep>,
     mut before: Local<TerrainStats>,
     stats: Res<TerrainStats>,
@@ -155,8 +147,8 @@ fn measure(
     mut diagnostics: Diagnostics,
 ) {
     let chunks = f64::from(drawn.chunks);
-    diagnostics.add_measurement(&DebugPlugin::CHUNKS, || chunks);
-    diagnostics.add_measurement(&DebugPlugin::TRIANGLES, || drawn.triangles as f64);
+    diagnostics.add_measurement(&TerrainDiagnosticsPlugin::CHUNKS, || chunks);
+    diagnostics.add_measurement(&TerrainDiagnosticsPlugin::TRIANGLES, || drawn.triangles as f64);
     let (mut to_fill, mut to_mesh, mut to_come, mut notes) = (0, 0, 0, 0);
     for (_, volume) in &volumes {
         let heart = volume.heart();
@@ -165,27 +157,27 @@ fn measure(
         to_come += heart.waiting_to_come();
         notes += heart.notes_bytes();
     }
-    diagnostics.add_measurement(&DebugPlugin::FILL_QUEUE, || to_fill as f64);
-    diagnostics.add_measurement(&DebugPlugin::MESH_QUEUE, || to_mesh as f64);
-    diagnostics.add_measurement(&DebugPlugin::WAITING_CHUNKS, || (to_come + to_fill + to_mesh) as f64);
+    diagnostics.add_measurement(&TerrainDiagnosticsPlugin::FILL_QUEUE, || to_fill as f64);
+    diagnostics.add_measurement(&TerrainDiagnosticsPlugin::MESH_QUEUE, || to_mesh as f64);
+    diagnostics.add_measurement(&TerrainDiagnosticsPlugin::WAITING_CHUNKS, || (to_come + to_fill + to_mesh) as f64);
     let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
-    diagnostics.add_measurement(&DebugPlugin::MAIN_THREAD, || milliseconds(budget.spent()));
+    diagnostics.add_measurement(&TerrainDiagnosticsPlugin::MAIN_THREAD, || milliseconds(budget.spent()));
     sweep.go_on(&volumes);
     if sweep.found.len() == volumes.iter().len() {
         let bytes = (sweep.found.values().sum::<usize>() + notes + drawn.bytes) as f64;
-        diagnostics.add_measurement(&DebugPlugin::RESIDENT_BYTES, || bytes);
+        diagnostics.add_measurement(&TerrainDiagnosticsPlugin::RESIDENT_BYTES, || bytes);
         if drawn.chunks > 0 {
-            diagnostics.add_measurement(&DebugPlugin::BYTES_PER_SURFACE_CHUNK, || bytes / chunks);
+            diagnostics.add_measurement(&TerrainDiagnosticsPlugin::BYTES_PER_SURFACE_CHUNK, || bytes / chunks);
         }
     }
     let meshed = stats.meshed - before.meshed;
     if meshed > 0 {
         let mesh_time = milliseconds(stats.mesh_time - before.mesh_time);
-        diagnostics.add_measurement(&DebugPlugin::MESH_TIME, || mesh_time / meshed as f64);
+        diagnostics.add_measurement(&TerrainDiagnosticsPlugin::MESH_TIME, || mesh_time / meshed as f64);
     }
     if stats.edits_shown > before.edits_shown {
-        diagnostics.add_measurement(&DebugPlugin::EDIT_UPDATES, || stats.edit_updates_last as f64);
-        diagnostics.add_measurement(&DebugPlugin::EDIT_TIME, || milliseconds(stats.edit_time_last));
+        diagnostics.add_measurement(&TerrainDiagnosticsPlugin::EDIT_UPDATES, || stats.edit_updates_last as f64);
+        diagnostics.add_measurement(&TerrainDiagnosticsPlugin::EDIT_TIME, || milliseconds(stats.edit_time_last));
     }
     *before = *stats;
 }

@@ -1,10 +1,10 @@
-//! [`SpareSamples`]: memory for copies of samples that are to be changed.
+//! [`SamplePool`]: memory for copies of samples that are to be changed.
 
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::{Chunk, ChunkSamples};
+use super::{GridChunk, GridSamples};
 use crate::sample::Voxel;
 
 /// The memory of samples that are no longer needed, for the samples that edits write out or copy before they change them.
@@ -12,20 +12,21 @@ use crate::sample::Voxel;
 /// Where allocators give what is freed back to the thread that allocated it, as many do, copies of samples that came from
 /// other threads take new memory each time, and each page of it has to be mapped, which takes longer than copying.
 #[derive(Debug)]
-pub struct SpareSamples<W = i16>(Vec<Arc<ChunkSamples<W>>>);
+#[doc(hidden)]
+pub struct SamplePool<W = i16>(Vec<Arc<GridSamples<W>>>);
 
 /// As many chunks as a small edit changes at most.
 const MOST: usize = 8;
 
-impl<W> SpareSamples<W> {
+impl<W> SamplePool<W> {
     /// No memory.
     pub const fn new() -> Self {
         Self(Vec::new())
     }
 
     /// Keeps a chunk's memory, unless some clone of it is still there, or enough has been kept.
-    pub fn keep(&mut self, chunk: Chunk<W>) {
-        if let Chunk::Samples(mut samples) = chunk
+    pub fn keep(&mut self, chunk: GridChunk<W>) {
+        if let GridChunk::Samples(mut samples) = chunk
             && self.0.len() < MOST
             && Arc::get_mut(&mut samples).is_some()
         {
@@ -34,13 +35,13 @@ impl<W> SpareSamples<W> {
     }
 }
 
-impl<W: Clone> SpareSamples<W> {
+impl<W: Clone> SamplePool<W> {
     /// Samples that are all alike.
-    pub(super) fn filled(&mut self, voxel: Voxel<W>, len: usize) -> Arc<ChunkSamples<W>> {
+    pub(super) fn filled(&mut self, voxel: Voxel<W>, len: usize) -> Arc<GridSamples<W>> {
         let Some(mut room) = self.0.pop() else {
-            return Arc::new(ChunkSamples { weights: vec![voxel.weight; len], materials: vec![voxel.material; len] });
+            return Arc::new(GridSamples { weights: vec![voxel.weight; len], materials: vec![voxel.material; len] });
         };
-        let ChunkSamples { weights, materials } = Arc::make_mut(&mut room);
+        let GridSamples { weights, materials } = Arc::make_mut(&mut room);
         weights.clear();
         weights.resize(len, voxel.weight);
         materials.clear();
@@ -49,7 +50,7 @@ impl<W: Clone> SpareSamples<W> {
     }
 
     /// Makes samples the caller's own, to be changed: where clones of them are there, a copy takes their place.
-    pub(super) fn make_mut<'a>(&mut self, samples: &'a mut Arc<ChunkSamples<W>>) -> &'a mut ChunkSamples<W> {
+    pub(super) fn make_mut<'a>(&mut self, samples: &'a mut Arc<GridSamples<W>>) -> &'a mut GridSamples<W> {
         if Arc::get_mut(samples).is_none()
             && let Some(mut copy) = self.0.pop()
             && let Some(room) = Arc::get_mut(&mut copy)
@@ -62,7 +63,7 @@ impl<W: Clone> SpareSamples<W> {
     }
 }
 
-impl<W> Default for SpareSamples<W> {
+impl<W> Default for SamplePool<W> {
     fn default() -> Self {
         Self::new()
     }
@@ -72,35 +73,35 @@ impl<W> Default for SpareSamples<W> {
 mod tests {
     use super::*;
 
-    fn samples(weight: i16) -> Arc<ChunkSamples> {
-        Arc::new(ChunkSamples { weights: vec![weight; 512], materials: vec![7; 512] })
+    fn samples(weight: i16) -> Arc<GridSamples> {
+        Arc::new(GridSamples { weights: vec![weight; 512], materials: vec![7; 512] })
     }
 
     #[test]
     fn memory_is_used_again() {
-        let mut spare = SpareSamples::new();
+        let mut pool = SamplePool::new();
         let old = samples(1);
         let address = old.weights.as_ptr();
-        spare.keep(Chunk::Samples(old.clone()));
-        assert!(spare.0.is_empty(), "there is a clone");
-        spare.keep(Chunk::AIR);
-        spare.keep(Chunk::Samples(old));
+        pool.keep(GridChunk::Samples(old.clone()));
+        assert!(pool.0.is_empty(), "there is a clone");
+        pool.keep(GridChunk::AIR);
+        pool.keep(GridChunk::Samples(old));
         let mut own = samples(2);
         let own_address = own.weights.as_ptr();
-        assert_eq!(spare.make_mut(&mut own).weights.as_ptr(), own_address, "nobody else has it");
+        assert_eq!(pool.make_mut(&mut own).weights.as_ptr(), own_address, "nobody else has it");
         let clone = own.clone();
-        spare.make_mut(&mut own).weights[3] = 5;
+        pool.make_mut(&mut own).weights[3] = 5;
         assert_eq!((own.weights.as_ptr(), own.weights[2], own.weights[3], own.materials[3]), (address, 2, 5, 7));
         assert_eq!(clone, samples(2));
         let clone = own.clone();
-        spare.make_mut(&mut own).weights[4] = 6;
-        assert_eq!((own.weights[3], own.weights[4], clone.weights[4]), (5, 6, 2), "copied without spare memory");
-        spare.keep(Chunk::Samples(clone));
-        let written = spare.filled(Voxel::new(8, 9), 343);
+        pool.make_mut(&mut own).weights[4] = 6;
+        assert_eq!((own.weights[3], own.weights[4], clone.weights[4]), (5, 6, 2), "copied without pool memory");
+        pool.keep(GridChunk::Samples(clone));
+        let written = pool.filled(Voxel::new(8, 9), 343);
         assert_eq!(written.weights.as_ptr(), address);
-        assert_eq!(*written, ChunkSamples { weights: vec![8; 343], materials: vec![9; 343] });
-        assert_eq!(*spare.filled(Voxel::new(8, 9), 343), *written, "without spare memory");
-        (0..2 * MOST).for_each(|_| spare.keep(Chunk::Samples(samples(3))));
-        assert_eq!(spare.0.len(), MOST);
+        assert_eq!(*written, GridSamples { weights: vec![8; 343], materials: vec![9; 343] });
+        assert_eq!(*pool.filled(Voxel::new(8, 9), 343), *written, "without pool memory");
+        (0..2 * MOST).for_each(|_| pool.keep(GridChunk::Samples(samples(3))));
+        assert_eq!(pool.0.len(), MOST);
     }
 }
