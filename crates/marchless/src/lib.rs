@@ -95,6 +95,7 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+mod active;
 pub mod bits;
 mod brush;
 mod buffer;
@@ -106,6 +107,7 @@ mod math;
 mod mesher;
 mod query;
 mod sample;
+mod signs;
 mod simd;
 mod source;
 mod validate;

@@ -205,7 +205,15 @@ pub(crate) trait Simd {
     ) -> usize;
 }
 
-/// Whether each of 32 samples lies below the isovalue: a bit each.
+/// The nonzero words among the first `count`, a bit each. Zeroes the words behind them up to a multiple of eight.
+#[inline(always)]
+pub(crate) fn nonzero_words<S: Simd>(words: &mut [u64; 64], count: usize) -> u64 {
+    let len = count.next_multiple_of(8);
+    words[count..len].fill(0);
+    S::nonzero(&words[..len])
+}
+
+/// The samples of 32 that lie below the isovalue, a bit each.
 #[inline(always)]
 pub(crate) fn below<S: Simd, W: Weight>(weights: &[W; 32], threshold: W::Threshold) -> u32 {
     W::call::<Below<S>>((weights, threshold))
@@ -281,7 +289,7 @@ const FACE_CORNERS: [[u64; 8]; 4] = {
 /// Codes of cells; a power of two, so that a masked code needs no check.
 pub(crate) const CODES: usize = 1024;
 
-/// What a cell of some code adds to the mesh, in half a cache line. See `mesher/triangles.rs`, which derives them.
+/// What a cell of some code adds to the mesh, in half a cache line. `mesher/primal/triangles.rs` derives them.
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
 pub(crate) struct Recipe {

@@ -3,11 +3,11 @@
 use super::BitGrid;
 use crate::{
     lattice::Samples,
-    mesher::sign_row,
     sample::{
         Weight,
         private::{PerWeight, Sealed},
     },
+    signs::sign_row,
     simd::{Backend, Job, Simd, dispatch},
 };
 

@@ -3,10 +3,17 @@
 use alloc::vec::Vec;
 
 use super::{
-    MeshError, MeshSettings,
-    slabs::{Input, Lattice, Meshing, Slabs, Window},
+    error::MeshError,
+    job::{Input, MeshJob},
+    pipeline::SlabPipeline,
+    settings::MeshSettings,
 };
-use crate::{buffer::MeshBuffer, sample::Weight, simd::Backend};
+use crate::{
+    buffer::MeshBuffer,
+    sample::Weight,
+    signs::{SlabLayout, Window},
+    simd::Backend,
+};
 
 /// Meshes a volume that is fed slab by slab, along z; holds four slabs of it.
 ///
@@ -37,8 +44,8 @@ pub struct SlabMesher<W> {
     backend: Backend,
     settings: MeshSettings,
     size: [u32; 2],
-    lattice: Lattice,
-    slabs: Slabs,
+    layout: SlabLayout,
+    pipeline: SlabPipeline,
     /// The newest slabs: slab `z` at `z % 4`.
     newest: [Vec<W>; 4],
     /// Slabs that have come.
@@ -54,9 +61,9 @@ impl<W: Weight> SlabMesher<W> {
     /// [`MeshError::Isovalue`] where the isovalue is not finite.
     pub fn new(size: [u32; 2], settings: MeshSettings) -> Result<Self, MeshError> {
         settings.check()?;
-        let lattice = Lattice::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
-        let (backend, slabs) = (Backend::fastest(), Slabs::new());
-        Ok(Self { backend, settings, size, lattice, slabs, newest: Default::default(), count: 0 })
+        let layout = SlabLayout::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
+        let (backend, pipeline) = (Backend::fastest(), SlabPipeline::new());
+        Ok(Self { backend, settings, size, layout, pipeline, newest: Default::default(), count: 0 })
     }
 
     /// Takes in the next slab and appends to `out` what it completes. `slab`: `[nx·ny]`, x fastest.
@@ -68,8 +75,8 @@ impl<W: Weight> SlabMesher<W> {
     /// [`MeshError::SlabLength`], and nothing has changed. [`MeshError::TooManyVertices`], and so with every further
     /// call; `out` then ends with vertices of no triangle.
     pub fn push(&mut self, slab: &[W], out: &mut MeshBuffer) -> Result<(), MeshError> {
-        if slab.len() != self.lattice.len {
-            let (size, expected) = (self.size, self.lattice.len);
+        if slab.len() != self.layout.len {
+            let (size, expected) = (self.size, self.layout.len);
             return Err(MeshError::SlabLength { size, expected, found: slab.len() });
         }
         let fill = |newest: &mut Vec<W>| {
@@ -83,7 +90,7 @@ impl<W: Weight> SlabMesher<W> {
     pub(crate) fn push_with(&mut self, fill: impl FnOnce(&mut Vec<W>), out: &mut MeshBuffer) -> Result<(), MeshError> {
         let newest = &mut self.newest[self.count % 4];
         fill(newest);
-        debug_assert_eq!(newest.len(), self.lattice.len);
+        debug_assert_eq!(newest.len(), self.layout.len);
         self.count += 1;
         // Gradients need the slab above.
         if self.count >= 2 { self.step(self.count - 2, out) } else { Ok(()) }
@@ -110,7 +117,7 @@ impl<W: Weight> SlabMesher<W> {
     /// # Errors
     /// As [`SlabMesher::new`].
     pub(crate) fn start_over(&mut self, size: [u32; 2]) -> Result<(), MeshError> {
-        self.lattice = Lattice::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
+        self.layout = SlabLayout::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
         (self.size, self.count) = (size, 0);
         Ok(())
     }
@@ -125,8 +132,8 @@ impl<W: Weight> SlabMesher<W> {
             one_sided: [z <= 1, z == 0 || z == last],
         };
         let input = Input::Stream { window, has_next: z < last };
-        let (settings, slabs) = (&self.settings, &mut self.slabs);
-        Meshing { input, lattice: self.lattice, settings, slabs, out }.on(self.backend)
+        let (settings, pipeline) = (&self.settings, &mut self.pipeline);
+        MeshJob { input, layout: self.layout, settings, pipeline, out }.run_on(self.backend)
     }
 }
 
@@ -146,9 +153,9 @@ mod tests {
         // Four vertices come between these two slabs.
         mesher.push(&[-1; 4], &mut mesh).unwrap();
         let mut last = mesher.clone();
-        last.slabs.vertices = u64::from(u32::MAX) - 4;
+        last.pipeline.vertex_count = u64::from(u32::MAX) - 4;
         last.finish(&mut mesh).unwrap();
-        mesher.slabs.vertices = u64::from(u32::MAX) - 3;
+        mesher.pipeline.vertex_count = u64::from(u32::MAX) - 3;
         mesh.clear();
         let too_many = MeshError::TooManyVertices { found: u64::from(u32::MAX) + 1 };
         assert_eq!(mesher.push(&[-1; 4], &mut mesh), Err(too_many));
@@ -156,7 +163,7 @@ mod tests {
 
         let weights = [1i8, 1, 1, 1, -1, -1, -1, -1];
         let samples = Samples::new(Shape::cube(2).unwrap(), &weights).unwrap();
-        let mut next = Mesher { backend: None, slabs: mesher.slabs };
+        let mut next = Mesher { backend: None, pipeline: mesher.pipeline };
         next.mesh(samples, &MeshSettings::default(), &mut mesh).unwrap();
         assert_eq!(mesh.triangle_count(), 2);
     }

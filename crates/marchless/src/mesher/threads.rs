@@ -9,9 +9,11 @@ use std::{
 };
 
 use super::{
-    MeshError, MeshSettings,
-    output::{keep, room, union},
-    slabs::{Input, Lattice, Meshing, Slabs},
+    error::{MeshError, checked_layout},
+    job::{Input, MeshJob},
+    output::{commit, reserve, union},
+    pipeline::SlabPipeline,
+    settings::MeshSettings,
 };
 use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
 
@@ -41,13 +43,13 @@ pub struct ThreadedMesher {
     threads: NonZero<usize>,
     backend: Backend,
     parts: Vec<MeshBuffer>,
-    slabs: Vec<Slabs>,
+    pipelines: Vec<SlabPipeline>,
 }
 
 impl ThreadedMesher {
     /// A mesher that has allocated nothing yet and will use `threads` threads, the caller's among them.
     pub fn new(threads: NonZero<usize>) -> Self {
-        Self { threads, backend: Backend::fastest(), parts: Vec::new(), slabs: Vec::new() }
+        Self { threads, backend: Backend::fastest(), parts: Vec::new(), pipelines: Vec::new() }
     }
 
     /// Meshes `samples` into `out`, whose former content is dropped. No surface is no error: `out` is then empty.
@@ -62,26 +64,26 @@ impl ThreadedMesher {
     ) -> Result<(), MeshError> {
         out.clear();
         settings.check()?;
-        let lattice = Lattice::of(&samples)?;
-        let cells = lattice.size[2] - 1;
+        let layout = checked_layout(&samples)?;
+        let cells = layout.size[2] - 1;
         let threads = self.threads.get().min(cells);
         let parts = threads.saturating_mul(PARTS).min(cells);
         self.parts.resize_with(parts, MeshBuffer::new);
-        self.slabs.resize_with(threads, Slabs::new);
+        self.pipelines.resize_with(threads, SlabPipeline::new);
 
         let backend = self.backend;
         let start_of = |part: usize| (cells as u64 * part as u64 / parts as u64) as usize;
         let queue = Mutex::new(self.parts.iter_mut().enumerate());
-        let work = |slabs: &mut Slabs| {
+        let work = |pipeline: &mut SlabPipeline| {
             while let Some((part, out)) = next(&queue) {
                 out.clear();
                 let input = Input::Volume { samples, cells: start_of(part)..start_of(part + 1) };
-                Meshing { input, lattice, settings, slabs, out }.on(backend)?;
+                MeshJob { input, layout, settings, pipeline, out }.run_on(backend)?;
             }
             Ok(())
         };
         let work = &work;
-        on_threads(self.slabs.iter_mut().map(|slabs| move || work(slabs)))?;
+        on_threads(self.pipelines.iter_mut().map(|pipeline| move || work(pipeline)))?;
         concatenate(&self.parts, threads, out)
     }
 }
@@ -128,8 +130,8 @@ fn concatenate(parts: &[MeshBuffer], threads: usize, out: &mut MeshBuffer) -> Re
     if u32::try_from(lens[0]).is_err() {
         return Err(MeshError::TooManyVertices { found: lens[0] as u64 });
     }
-    let (mut positions, mut normals) = (room(&mut out.positions, lens[0]), room(&mut out.normals, lens[1]));
-    let (mut materials, mut indices) = (room(&mut out.materials, lens[2]), room(&mut out.indices, indices_len));
+    let (mut positions, mut normals) = (reserve(&mut out.positions, lens[0]), reserve(&mut out.normals, lens[1]));
+    let (mut materials, mut indices) = (reserve(&mut out.materials, lens[2]), reserve(&mut out.indices, indices_len));
     let mut base = 0;
     let mut pieces = Vec::new();
     for part in parts {
@@ -160,10 +162,10 @@ fn concatenate(parts: &[MeshBuffer], threads: usize, out: &mut MeshBuffer) -> Re
     // SAFETY: the pieces fill the room without a gap, and all of them have been written.
     #[expect(unsafe_code, reason = "spares filling the vectors with zeros first")]
     unsafe {
-        keep(&mut out.positions, lens[0]);
-        keep(&mut out.normals, lens[1]);
-        keep(&mut out.materials, lens[2]);
-        keep(&mut out.indices, indices_len);
+        commit(&mut out.positions, lens[0]);
+        commit(&mut out.normals, lens[1]);
+        commit(&mut out.materials, lens[2]);
+        commit(&mut out.indices, indices_len);
     }
     Ok(())
 }

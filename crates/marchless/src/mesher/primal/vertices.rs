@@ -1,97 +1,80 @@
-//! Pass 2: one vertex for each crossing of a slab, with its position, normal and material.
+//! The vertex pass: one vertex for each crossing, with its position, normal and material.
 //!
-//! The crossings of many rows are listed first, so that what follows are long loops without branches: one that copies
-//! what each vertex is made of from the samples to arrays, and one that computes up to sixteen vertices side by side.
-//! The second is a plain loop, written so that the compiler makes vector instructions of it (arrays of fixed length, no
-//! closures, conditions as selections).
+//! The pass first lists the crossings of many rows, so that long loops without branches follow: one that copies the
+//! samples around each crossing to arrays, and one that computes up to sixteen vertices side by side. The second is a
+//! plain loop in a form that the compiler vectorises (arrays of fixed length, no closures, conditions as selections).
 //!
 //! Refused, with times of a padded chunk of 35³ `i16` samples (caves, AVX-512, Zen 4, 3.7 GHz; 42 µs as it is), each
-//! beside what stood then:
-//! - each vertex computed as it is found, from slices of rows: 141 µs;
-//! - gradients' differences taken while gathering, which writes eight numbers a vertex: 50 µs, and 330 instead of
-//!   260 µs on white noise; the loop is bound by its stores;
+//! beside the time of its day:
+//! - computing each vertex as it is found, from slices of rows: 141 µs;
+//! - taking the gradients' differences while gathering, which writes eight numbers a vertex: 50 µs, and 330 instead of
+//!   260 µs on white noise; stores bound the loop;
 //! - `f32` samples in pairs like the integers' (51 instead of 45 µs), and integers in fours like `f32`'s (59 instead of
 //!   53 µs with AVX2): compilers take these apart badly;
-//! - listing the crossings of all words, without looking for those that have any: 59 instead of 56 µs.
-
-mod mend;
+//! - listing the crossings of all words instead of the nonzero ones: 59 instead of 56 µs.
 
 use core::mem::MaybeUninit;
 
-use super::{
-    MeshSettings,
-    output::{Bounds, keep, room},
-    slabs::Lattice,
+use super::mend::mend;
+use crate::mesher::{
+    crossing::{clamped, interpolated},
+    output::{VertexBounds, commit, reserve},
+    settings::MeshSettings,
 };
 use crate::{
     buffer::MeshBuffer,
     math::sqrt,
     sample::{Weight, is_sound},
-    simd::Simd,
+    signs::{EdgeSlabs, SlabLayout},
+    simd::{Simd, nonzero_words},
 };
 
-/// Crossings stay this far from the ends of their edge.
-pub(super) const MARGIN: f32 = 1.0 / 1024.0;
+/// Crossings of one batch: from this many on they become vertices.
+const BATCH: usize = 128;
+/// The capacity of a batch: the word that completes it may add 63 crossings, and `compute` rounds up to sixteen.
+const BATCH_CAPACITY: usize = BATCH + 64;
 
-/// Crossings that are gathered before they become vertices.
-const GATHERED: usize = 128;
-/// Room for them, the rest of the word that makes them enough, and sixteen side by side.
-const ROOM: usize = GATHERED + 64;
-
-/// The samples that edges of one axis need: whole slabs, padding included.
-#[derive(Clone, Copy)]
-pub(super) struct Planes<'a, W> {
-    /// The slab below the edges, those of their low and their high ends (the same for edges along x and y), and the one
-    /// above. At an open border the outermost one stands in for what is missing.
-    pub(super) slabs: [&'a [W]; 4],
-    /// Whether the gradient along z is one-sided at the low, and at the high ends.
-    pub(super) one_sided: [bool; 2],
-    /// The materials of the low and the high ends' slabs, where there are any.
-    pub(super) materials: Option<[&'a [u8]; 2]>,
-    /// The low ends' lattice position along z.
-    pub(super) z: usize,
-}
-
-/// Gathers crossings and turns them into vertices.
+/// Gathers crossings in batches and turns them into vertices.
 ///
-/// What a vertex is made of is copied from the samples in as few pieces as possible: four neighbours along x at once,
-/// or two; the arithmetic is left to [`Vertices::finish`].
-pub(super) struct Vertices<W: Weight> {
-    /// Of all vertices made.
-    pub(super) bounds: Bounds,
-    x: [u32; ROOM],
-    y: [u32; ROOM],
-    /// The samples around the low and the high end along x, from one below the end on. (On an edge along x, the high
-    /// end is in the low one's.)
-    rows: [([W::Left; ROOM], [W::Right; ROOM]); 2],
-    /// On an edge along x: the neighbours of both ends below along y, above along y, below along z, above along z.
-    pairs: [[W::Pair; ROOM]; 4],
-    /// On other edges: the sample below the low end, and the one above the high end.
-    outer: [[W; ROOM]; 2],
-    /// On edges along y and z: twice the gradient along the other of the two, at both ends.
-    across: [[W::Wide; ROOM]; 2],
+/// Samples are copied in as few pieces as possible: four neighbours along x at once, or two. The arithmetic is left to
+/// [`VertexPass::compute`].
+pub(in crate::mesher) struct VertexPass<W: Weight> {
+    /// The bounds of all vertices made.
+    pub(in crate::mesher) bounds: VertexBounds,
+    /// The lattice positions of the edges' low ends.
+    x: [u32; BATCH_CAPACITY],
+    y: [u32; BATCH_CAPACITY],
+    /// The four samples around the low and around the high end along x: one below the end, the end, and two above. On an
+    /// edge along x, the low end's hold the high end.
+    rows: [([W::Left; BATCH_CAPACITY], [W::Right; BATCH_CAPACITY]); 2],
+    /// On an edge along x: both ends' neighbours below along y, above along y, below along z, and above along z.
+    pairs: [[W::Pair; BATCH_CAPACITY]; 4],
+    /// On an edge along y or z: the sample below the low end, and the one above the high end.
+    outer: [[W; BATCH_CAPACITY]; 2],
+    /// On an edge along y: twice the gradient along z at both ends; on an edge along z, that along y.
+    across: [[W::Wide; BATCH_CAPACITY]; 2],
 }
 
-impl<W: Weight> Vertices<W> {
-    pub(super) fn new() -> Self {
+impl<W: Weight> VertexPass<W> {
+    pub(in crate::mesher) fn new() -> Self {
         Self {
-            bounds: Bounds::NONE,
-            x: [0; ROOM],
-            y: [0; ROOM],
-            rows: [([W::Left::default(); ROOM], [W::Right::default(); ROOM]); 2],
-            pairs: [[W::Pair::default(); ROOM]; 4],
-            outer: [[W::OUTSIDE; ROOM]; 2],
-            across: [[W::Wide::default(); ROOM]; 2],
+            bounds: VertexBounds::NONE,
+            x: [0; BATCH_CAPACITY],
+            y: [0; BATCH_CAPACITY],
+            rows: [([W::Left::default(); BATCH_CAPACITY], [W::Right::default(); BATCH_CAPACITY]); 2],
+            pairs: [[W::Pair::default(); BATCH_CAPACITY]; 4],
+            outer: [[W::OUTSIDE; BATCH_CAPACITY]; 2],
+            across: [[W::Wide::default(); BATCH_CAPACITY]; 2],
         }
     }
 
-    /// Makes the vertices on all edges along `AXIS`, row by row, and returns how many there are. `low` and `high`: the
-    /// signs of the edges' ends.
+    /// Appends the vertices on all edges along `AXIS`, row by row, and returns their number. `low` and `high`: the signs
+    /// of the edges' ends.
     #[inline(always)]
-    pub(super) fn place<S: Simd, const AXIS: usize>(
+    pub(in crate::mesher) fn add<S: Simd, const AXIS: usize>(
         &mut self,
-        lattice: &Lattice,
-        planes: &Planes<'_, W>,
+        layout: &SlabLayout,
+        edges: &EdgeSlabs<'_, W>,
         settings: &MeshSettings,
         low: &[u64],
         high: &[u64],
@@ -99,96 +82,97 @@ impl<W: Weight> Vertices<W> {
     ) -> u64 {
         let mut made = 0;
         let mut blocks = low.chunks(64).zip(high.chunks(64)).enumerate();
-        // Of the present block of words: its number, their crossings, and which are not zero and not done.
+        // The present block of words: its number, its crossings, and its nonzero words that are still to be done.
         let (mut block, mut crossed, mut words) = (0, [0; 64], 0u64);
         loop {
             let mut gathered = 0;
-            while gathered < GATHERED {
+            while gathered < BATCH {
                 if words == 0 {
                     let Some((number, (low, high))) = blocks.next() else { break };
                     for (crossed, (low, high)) in crossed.iter_mut().zip(low.iter().zip(high)) {
                         *crossed = low ^ high;
                     }
-                    words = S::nonzero(filled(&mut crossed, low.len()));
+                    words = nonzero_words::<S>(&mut crossed, low.len());
                     block = number;
                     continue;
                 }
                 let word = words.trailing_zeros() as usize;
                 words &= words - 1;
-                let (y, x) = lattice.place_of(64 * block + word);
+                let (y, x) = layout.word_position(64 * block + word);
                 let (xs, ys) = (self.x[gathered..].first_chunk_mut(), self.y[gathered..].first_chunk_mut());
-                let (xs, ys) = xs.zip(ys).expect("there is room for another word's");
+                let (xs, ys) = xs.zip(ys).expect("another word's crossings fit");
                 gathered += S::positions(crossed[word % 64], x, y, xs, ys);
             }
             if gathered == 0 {
                 return made;
             }
-            self.flush::<AXIS>(lattice, planes, settings, gathered, out);
+            self.append_batch::<AXIS>(layout, edges, settings, gathered, out);
             made += gathered as u64;
         }
     }
 
-    /// Makes vertices of the first `count` crossings that were gathered.
+    /// Appends the vertices of the first `count` crossings that were gathered.
     #[inline(always)]
-    fn flush<const AXIS: usize>(
+    fn append_batch<const AXIS: usize>(
         &mut self,
-        lattice: &Lattice,
-        planes: &Planes<'_, W>,
+        layout: &SlabLayout,
+        edges: &EdgeSlabs<'_, W>,
         settings: &MeshSettings,
         count: usize,
         out: &mut MeshBuffer,
     ) {
-        if lattice.padded {
-            self.gather::<AXIS, true>(lattice, planes, count);
+        if layout.padded {
+            self.gather::<AXIS, true>(layout, edges, count);
         } else {
-            self.gather::<AXIS, false>(lattice, planes, count);
+            self.gather::<AXIS, false>(layout, edges, count);
         }
-        let side_by_side = count.next_multiple_of(16);
-        let positions = &mut room(&mut out.positions, side_by_side)[..side_by_side];
+        let computed = count.next_multiple_of(16);
+        let positions = &mut reserve(&mut out.positions, computed)[..computed];
         let sound = if !settings.normals {
-            self.finish::<AXIS, false, true>(lattice, planes, settings, count, positions, &mut [])
+            self.compute::<AXIS, false, true>(layout, edges, settings, count, positions, &mut [])
         } else {
-            let normals = &mut room(&mut out.normals, side_by_side)[..side_by_side];
-            if lattice.padded {
-                self.finish::<AXIS, true, true>(lattice, planes, settings, count, positions, normals)
+            let normals = &mut reserve(&mut out.normals, computed)[..computed];
+            if layout.padded {
+                self.compute::<AXIS, true, true>(layout, edges, settings, count, positions, normals)
             } else {
-                self.finish::<AXIS, true, false>(lattice, planes, settings, count, positions, normals)
+                self.compute::<AXIS, true, false>(layout, edges, settings, count, positions, normals)
             }
         };
         if !sound {
-            self.mend::<AXIS>(lattice, planes, settings, count, out);
+            let positions = [&self.x[..count], &self.y[..count]];
+            mend::<AXIS, W>(layout, edges, settings, positions, &mut self.bounds, out);
         }
-        // SAFETY: `finish` has written all of them.
+        // SAFETY: `compute` has written all of them.
         #[expect(unsafe_code, reason = "spares filling the vectors with zeros first")]
         unsafe {
-            keep(&mut out.positions, count);
+            commit(&mut out.positions, count);
             if settings.normals {
-                keep(&mut out.normals, count);
+                commit(&mut out.normals, count);
             }
         }
-        if let Some(materials) = planes.materials {
+        if let Some(materials) = edges.materials {
             let threshold = W::threshold(settings.isovalue);
             out.materials.extend(self.x[..count].iter().zip(&self.y[..count]).map(|(&x, &y)| {
-                let low = lattice.index(x, y);
-                if planes.slabs[1][low].inside(threshold) {
+                let low = layout.index(x, y);
+                if edges.slabs[1][low].inside(threshold) {
                     materials[0][low]
                 } else {
-                    materials[1][low + lattice.step::<AXIS>()]
+                    materials[1][low + layout.step::<AXIS>()]
                 }
             }));
         }
     }
 
-    /// Copies what the first `count` vertices are made of.
+    /// Copies the samples that the first `count` vertices need.
     #[inline(always)]
     fn gather<const AXIS: usize, const PADDED: bool>(
         &mut self,
-        lattice: &Lattice,
-        planes: &Planes<'_, W>,
+        layout: &SlabLayout,
+        edges: &EdgeSlabs<'_, W>,
         count: usize,
     ) {
-        let [below, low, high, above] = planes.slabs;
-        assert!(planes.slabs.iter().all(|slab| slab.len() == lattice.len), "all slabs are whole");
+        let [below, low, high, above] = edges.slabs;
+        assert!(edges.slabs.iter().all(|slab| slab.len() == layout.len), "all slabs are whole");
         let (xs, ys) = (&self.x[..count], &self.y[..count]);
         let [(low_left, low_right), (high_left, high_right)] = &mut self.rows;
         let (low_left, low_right) = (&mut low_left[..count], &mut low_right[..count]);
@@ -202,25 +186,25 @@ impl<W: Weight> Vertices<W> {
         let (across_low, across_high) = (&mut across_low[..count], &mut across_high[..count]);
         for i in 0..count {
             let (x, y) = (xs[i], ys[i]);
-            let a = lattice.index(x, y);
-            let b = a + lattice.step::<AXIS>();
+            let a = layout.index(x, y);
+            let b = a + layout.step::<AXIS>();
             let y_high = y + u32::from(AXIS == 1);
-            // SAFETY: the slabs are whole, both ends of a crossing are meshed samples, and where samples beside them
-            // are beyond an open border, the ends stand in for those.
+            // SAFETY: the slabs are whole, both ends of a crossing are meshed samples, and the ends stand in for
+            // neighbours beyond an open border.
             #[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
             unsafe {
-                let down = |index: usize, y: u32| if PADDED || y > 0 { index - lattice.stride } else { index };
+                let down = |index: usize, y: u32| if PADDED || y > 0 { index - layout.stride } else { index };
                 let up = |index: usize, y: u32| {
-                    if PADDED || (y as usize + 1) < lattice.size[1] { index + lattice.stride } else { index }
+                    if PADDED || (y as usize + 1) < layout.size[1] { index + layout.stride } else { index }
                 };
-                (low_left[i], low_right[i]) = four::<W, PADDED>(lattice, low, a, x);
+                (low_left[i], low_right[i]) = four::<W, PADDED>(layout, low, a, x);
                 if AXIS == 0 {
                     y_below[i] = two(low, down(a, y));
                     y_above[i] = two(low, up(a, y));
                     z_below[i] = two(below, a);
                     z_above[i] = two(above, a);
                 } else {
-                    (high_left[i], high_right[i]) = four::<W, PADDED>(lattice, high, b, x);
+                    (high_left[i], high_right[i]) = four::<W, PADDED>(layout, high, b, x);
                     if AXIS == 1 {
                         (outer_low[i], outer_high[i]) = (at(low, down(a, y)), at(high, up(b, y_high)));
                         across_low[i] = W::difference(at(above, a), at(below, a));
@@ -235,39 +219,41 @@ impl<W: Weight> Vertices<W> {
         }
     }
 
-    /// Computes the vertices from what was gathered, into slices of the next multiple of 16 of `count`. Returns whether
-    /// all of them are sound; where they are not, a difference was out of the range in which `f32` computes well.
+    /// Computes the gathered vertices, `count` rounded up to a multiple of 16 of them.
+    ///
+    /// Returns false if some difference was out of the range in which `f32` computes well; [`mend`] must then write all
+    /// vertices again.
     #[inline(always)]
-    fn finish<const AXIS: usize, const NORMALS: bool, const PADDED: bool>(
+    fn compute<const AXIS: usize, const NORMALS: bool, const PADDED: bool>(
         &mut self,
-        lattice: &Lattice,
-        planes: &Planes<'_, W>,
+        layout: &SlabLayout,
+        edges: &EdgeSlabs<'_, W>,
         settings: &MeshSettings,
         count: usize,
         positions: &mut [MaybeUninit<[f32; 3]>],
         normals: &mut [MaybeUninit<[f32; 3]>],
     ) -> bool {
-        let (z, isovalue) = (planes.z as f32, settings.isovalue * W::SCALE);
-        let [last_x, last_y] = [0, 1].map(|axis| (lattice.size[axis] - 1) as u32);
-        let [z_low, z_high] = planes.one_sided.map(|one_sided| if one_sided { 2.0 } else { 1.0 });
-        let room = positions.len();
-        let (xs, ys) = (&self.x[..room], &self.y[..room]);
+        let (z, isovalue) = (edges.z as f32, settings.isovalue * W::SCALE);
+        let [last_x, last_y] = [0, 1].map(|axis| (layout.size[axis] - 1) as u32);
+        let [z_low, z_high] = edges.one_sided.map(|one_sided| if one_sided { 2.0 } else { 1.0 });
+        let len = positions.len();
+        let (xs, ys) = (&self.x[..len], &self.y[..len]);
         let [(low_left, low_right), (high_left, high_right)] = &self.rows;
-        let (low_left, low_right) = (&low_left[..room], &low_right[..room]);
-        let (high_left, high_right) = (&high_left[..room], &high_right[..room]);
+        let (low_left, low_right) = (&low_left[..len], &low_right[..len]);
+        let (high_left, high_right) = (&high_left[..len], &high_right[..len]);
         let [y_below, y_above, z_below, z_above] = &self.pairs;
-        let (y_below, y_above) = (&y_below[..room], &y_above[..room]);
-        let (z_below, z_above) = (&z_below[..room], &z_above[..room]);
+        let (y_below, y_above) = (&y_below[..len], &y_above[..len]);
+        let (z_below, z_above) = (&z_below[..len], &z_above[..len]);
         let [outer_low, outer_high] = &self.outer;
-        let (outer_low, outer_high) = (&outer_low[..room], &outer_high[..room]);
+        let (outer_low, outer_high) = (&outer_low[..len], &outer_high[..len]);
         let [across_low, across_high] = &self.across;
-        let (across_low, across_high) = (&across_low[..room], &across_high[..room]);
+        let (across_low, across_high) = (&across_low[..len], &across_high[..len]);
         if NORMALS {
-            assert_eq!(normals.len(), room);
+            assert_eq!(normals.len(), len);
         }
-        let Bounds { mut min, mut max } = self.bounds;
+        let VertexBounds { mut min, mut max } = self.bounds;
         let mut unsound = false;
-        for i in 0..room {
+        for i in 0..len {
             let within = i < count;
             let row = W::joined(low_left[i], low_right[i]);
             let high_row = W::joined(high_left[i], high_right[i]);
@@ -277,7 +263,7 @@ impl<W: Weight> Vertices<W> {
             let mut position = [xs[i] as f32, ys[i] as f32, z];
             position[AXIS] += fraction;
             positions[i].write(position);
-            // Positions are not negative, so that their bits are in the same order.
+            // Positions are not negative, so their bits are in the same order.
             let mut axis = 0;
             while axis < 3 {
                 let bits = position[axis].to_bits();
@@ -319,7 +305,8 @@ impl<W: Weight> Vertices<W> {
                     az *= z_low;
                     bz *= z_high;
                 }
-                let (x, y, z) = (mixed(ax, bx, fraction), mixed(ay, by, fraction), mixed(az, bz, fraction));
+                let (x, y, z) =
+                    (interpolated(ax, bx, fraction), interpolated(ay, by, fraction), interpolated(az, bz, fraction));
                 let squared = x * x + y * y + z * z;
                 sound &= is_sound(squared);
                 let scale = 1.0 / sqrt(squared);
@@ -328,38 +315,38 @@ impl<W: Weight> Vertices<W> {
             unsound |= within & !sound;
         }
         if !unsound {
-            self.bounds = Bounds { min, max };
+            self.bounds = VertexBounds { min, max };
         }
         !unsound
     }
 }
 
-/// How much farther central differences reach than the one at `at`.
+/// The factor that makes the difference at `at` twice the gradient: 2 at an open border, where it is one-sided.
 #[inline(always)]
 const fn span(at: u32, last: u32) -> f32 {
     if (at == 0) | (at == last) { 2.0 } else { 1.0 }
 }
 
-/// Four samples along x, from the one before the meshed sample at `x` with index `index`.
+/// Four samples along x: the one before the meshed sample at `x` with index `index`, itself, and two behind it.
 ///
 /// # Safety
 /// `x` and `index` are those of a meshed sample of a whole slab.
 #[expect(unsafe_code, reason = "a dozen reads a vertex, in the loop that takes most of the time")]
 #[inline(always)]
 unsafe fn four<W: Weight, const PADDED: bool>(
-    lattice: &Lattice,
+    layout: &SlabLayout,
     slab: &[W],
     index: usize,
     x: u32,
 ) -> (W::Left, W::Right) {
     // SAFETY: padding lies before and behind each row, and a row of it behind the last. Without padding, the row's
-    // outermost samples stand in.
+    // outermost samples stand in for missing ones.
     unsafe {
         if PADDED {
             debug_assert!(index >= 1 && index + 2 < slab.len());
             return W::split(slab.as_ptr().add(index - 1).cast::<[W; 4]>().read());
         }
-        let behind = lattice.size[0] - 1 - x as usize;
+        let behind = layout.size[0] - 1 - x as usize;
         let [first, second] = [1, 2].map(|step| index + behind.min(step));
         let before = index - usize::from(x > 0);
         W::split([at(slab, before), at(slab, index), at(slab, first), at(slab, second)])
@@ -388,30 +375,4 @@ unsafe fn two<W: Weight>(slab: &[W], index: usize) -> W::Pair {
     debug_assert!(index + 1 < slab.len());
     // SAFETY: as the caller promises.
     W::pair(unsafe { slab.as_ptr().add(index).cast::<[W; 2]>().read() })
-}
-
-/// The first `count` words of a block, made up with zeros to a multiple of eight.
-#[inline(always)]
-pub(super) fn filled(block: &mut [u64; 64], count: usize) -> &[u64] {
-    let room = count.next_multiple_of(8);
-    block[count..room].fill(0);
-    &block[..room]
-}
-
-/// How far along the edge from `a` to `b` its vertex lies; `isovalue` in steps (voxels × `SCALE`).
-#[inline(always)]
-pub(crate) fn crossing_fraction<W: Weight>(a: W, b: W, isovalue: f32) -> f32 {
-    clamped(W::fraction(a, b, isovalue))
-}
-
-/// A NaN (both ends at the same limit of `f32`) fails the first comparison.
-#[inline(always)]
-pub(crate) fn clamped(fraction: f32) -> f32 {
-    let fraction = if fraction > MARGIN { fraction } else { MARGIN };
-    if fraction < 1.0 - MARGIN { fraction } else { 1.0 - MARGIN }
-}
-
-#[inline(always)]
-fn mixed(a: f32, b: f32, fraction: f32) -> f32 {
-    a + (b - a) * fraction
 }

@@ -1,91 +1,107 @@
-//! Cells that are made one by one: fans, discs around a vertex in the interior, and tunnels.
+//! Special cells, meshed one by one: fans, discs around a vertex in the interior, and tunnels.
 
 use alloc::vec::Vec;
 
 use super::{
-    Open,
     table::{FIRST_INTERIOR, Outcome, Sheets},
     tunnel::{RING, Strip, Waist, ring, spaced, straightened_corner, straightened_crossing, strip},
 };
+use crate::mesher::{output::VertexBounds, settings::MeshSettings};
 use crate::{
     buffer::MeshBuffer,
     cases::Loops,
     cell::{CaseIndex, Edge},
     math::sqrt_f64,
-    mesher::output::Bounds,
     sample::Weight,
+    signs::{EdgeSlabs, SlabLayout},
 };
 
-/// Vertices in the middle of a disc stay this far from the faces of the cell.
-const LEAST_DEPTH: f64 = 1.0 / 16.0;
+/// The least distance of a disc's middle vertex from the faces of the cell.
+const MIN_DEPTH: f64 = 1.0 / 16.0;
 
-/// Steps towards the surface end with one as short as this.
-const CLOSE_ENOUGH: f64 = 1.0 / 256.0;
+/// Steps towards the surface end after the first step that is shorter than this.
+const SHORTEST_STEP: f64 = 1.0 / 256.0;
 
-impl<W: Weight> Open<'_, W> {
-    /// Makes the cell's vertices in its interior and appends the cell's triangles: a tunnel's where there is a waist and
-    /// it can be told what is to be joined, and those of `outcome` otherwise. Returns how many vertices there are.
+/// Meshes one special cell.
+pub(super) struct SpecialMesher<'a, W> {
+    pub(super) layout: &'a SlabLayout,
+    pub(super) edges: &'a EdgeSlabs<'a, W>,
+    pub(super) settings: &'a MeshSettings,
+    /// The lattice position of the cell's lowest corner.
+    pub(super) x: u32,
+    pub(super) y: u32,
+    pub(super) case: CaseIndex,
+    /// The weights at the cell's corners minus the isovalue, in voxels.
+    pub(super) weights: [f64; 8],
+}
+
+impl<W: Weight> SpecialMesher<'_, W> {
+    /// Appends the vertices in the cell's interior and the cell's triangles. Returns the number of those vertices.
+    ///
+    /// The triangles form a tunnel if there is a waist and it is clear which loops it joins, otherwise the sheets of
+    /// `outcome`.
     #[inline(never)]
-    pub(super) fn make(
+    pub(super) fn mesh(
         &self,
         joined: u8,
         outcome: Outcome,
         waist: Option<Waist>,
         triangles: &mut Vec<[u8; 3]>,
-        bounds: &mut Bounds,
+        bounds: &mut VertexBounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        let field = Trilinear::new(&self.weights);
-        if let Some(tunnel) = waist.and_then(|waist| Tunnel::new(self.case, joined, &field, waist)) {
+        let interpolant = Interpolant::new(&self.weights);
+        if let Some(tunnel) = waist.and_then(|waist| Tunnel::new(self.case, joined, &interpolant, waist)) {
             for corner in tunnel.ring {
-                self.vertex(&field, corner, bounds, out);
+                self.vertex(&interpolant, corner, bounds, out);
             }
             triangles.extend(tunnel.strips.iter().flat_map(Strip::triangles));
             triangles.extend_from_slice(tunnel.others.triangles());
             debug_assert!(tunnel.others.rim().is_empty(), "beside a tunnel there is at most one small sheet");
             return RING as u64;
         }
-        let sheets = if outcome.is_made() { *outcome.sheets() } else { Sheets::new(&Loops::new(self.case, joined), 0) };
+        let sheets =
+            if outcome.is_special() { *outcome.sheets() } else { Sheets::new(&Loops::new(self.case, joined), 0) };
         triangles.extend_from_slice(sheets.triangles());
         if sheets.rim().is_empty() {
             return 0;
         }
         let mut sum = [0.0; 3];
         for &edge in sheets.rim() {
-            let [x, y, z] = field.crossing(edge);
+            let [x, y, z] = interpolant.crossing(edge);
             sum = [sum[0] + x, sum[1] + y, sum[2] + z];
         }
         let mean = sum.map(|sum| sum / sheets.rim().len() as f64);
-        self.vertex(&field, field.nearest_to(mean), bounds, out);
+        self.vertex(&interpolant, interpolant.nearest_to(mean), bounds, out);
         1
     }
 
     /// Appends a vertex to the mesh. `at`: in the cell.
-    fn vertex(&self, field: &Trilinear, at: [f64; 3], bounds: &mut Bounds, out: &mut MeshBuffer) {
-        let lowest = [f64::from(self.x), f64::from(self.y), self.planes.z as f64];
-        let position = core::array::from_fn(|axis| (lowest[axis] + at[axis]) as f32);
+    fn vertex(&self, interpolant: &Interpolant, at: [f64; 3], bounds: &mut VertexBounds, out: &mut MeshBuffer) {
+        let origin = [f64::from(self.x), f64::from(self.y), self.edges.z as f64];
+        let position = core::array::from_fn(|axis| (origin[axis] + at[axis]) as f32);
         bounds.include(position);
         out.positions.push(position);
         if self.settings.normals {
-            out.normals.push(field.normal(at));
+            out.normals.push(interpolant.normal(at));
         }
-        if let Some(materials) = self.planes.materials {
+        if let Some(materials) = self.edges.materials {
             let distance = |corner: usize| {
                 let [x, y, z] = core::array::from_fn(|axis| (corner >> axis & 1) as f64 - at[axis]);
                 x * x + y * y + z * z
             };
             let inside = (0..8).filter(|corner| self.case.0 >> corner & 1 == 1);
             let nearest = inside.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or_default();
-            let place = self.lattice.index(self.x, self.y);
-            out.materials.push(materials[nearest / 4][place + nearest % 2 + nearest / 2 % 2 * self.lattice.stride]);
+            let lowest = self.layout.index(self.x, self.y);
+            out.materials.push(materials[nearest / 4][lowest + nearest % 2 + nearest / 2 % 2 * self.layout.stride]);
         }
     }
 }
 
 /// The trilinear interpolant of a cell's weights, all of them finite.
-struct Trilinear([f64; 8]);
+struct Interpolant([f64; 8]);
 
-impl Trilinear {
+impl Interpolant {
     fn new(weights: &[f64; 8]) -> Self {
         // Twice what `f32` holds: the isovalue has been taken off.
         let [least, most] = [f32::MIN, f32::MAX].map(|limit| 2.0 * f64::from(limit));
@@ -138,8 +154,8 @@ impl Trilinear {
                 break;
             }
             let before = point;
-            point = [0, 1, 2].map(|axis| (point[axis] - step * gradient[axis]).clamp(LEAST_DEPTH, 1.0 - LEAST_DEPTH));
-            if (0..3).all(|axis| (point[axis] - before[axis]).abs() < CLOSE_ENOUGH) {
+            point = [0, 1, 2].map(|axis| (point[axis] - step * gradient[axis]).clamp(MIN_DEPTH, 1.0 - MIN_DEPTH));
+            if (0..3).all(|axis| (point[axis] - before[axis]).abs() < SHORTEST_STEP) {
                 break;
             }
         }
@@ -159,11 +175,11 @@ struct Tunnel {
 
 impl Tunnel {
     /// `None` where it cannot be told what is to be joined.
-    fn new(case: CaseIndex, joined: u8, field: &Trilinear, waist: Waist) -> Option<Self> {
+    fn new(case: CaseIndex, joined: u8, interpolant: &Interpolant, waist: Waist) -> Option<Self> {
         let loops = &Loops::new(case, joined);
         let corner = |corner: usize, waist: &Waist| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
         // On the ring the interpolant is about 0. What the tunnel goes around is farthest from that.
-        let value = |end: usize| field.at_with_gradient(corner(end, &waist)).0;
+        let value = |end: usize| interpolant.at_with_gradient(corner(end, &waist)).0;
         let (mut end, mut through) = (0, 0.0f64);
         for other in 0..4 {
             let value = value(other) + value(other ^ 7);
@@ -183,7 +199,7 @@ impl Tunnel {
             let (mut around, mut around_names) = ([[0.0; 3]; 12], [0; 12]);
             let edges = loops.get(number);
             for ((point, name), &edge) in around.iter_mut().zip(&mut around_names).zip(edges) {
-                *point = straightened_crossing(edge, field.crossing_along(edge), &waist);
+                *point = straightened_crossing(edge, interpolant.crossing_along(edge), &waist);
                 *name = edge.index() as u8;
             }
             let around = &around[..edges.len()];

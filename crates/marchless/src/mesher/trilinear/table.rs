@@ -1,9 +1,9 @@
 //! What becomes of each case once its faces are decided, derived at compile time.
 
 use crate::{
+    active::FIRST_FREE_CODE,
     cases::{Loops, fan_apex, triangulate},
     cell::{CaseIndex, Edge, Face},
-    mesher::triangles::FIRST_EXTRA,
 };
 
 /// What becomes of a cell.
@@ -12,14 +12,14 @@ pub(super) struct Outcome(u16);
 
 impl Outcome {
     /// The cell is made one by one.
-    const MADE: u16 = 1 << 14;
+    const SPECIAL: u16 = 1 << 14;
     /// Sheets of it may be joined by a tunnel.
     const TUNNEL: u16 = 1 << 15;
     /// That of the case without inside corners.
     const NONE: Self = Self(0);
 
-    pub(super) const fn is_made(self) -> bool {
-        self.0 & Self::MADE != 0
+    pub(super) const fn is_special(self) -> bool {
+        self.0 & Self::SPECIAL != 0
     }
 
     pub(super) const fn may_have_tunnel(self) -> bool {
@@ -29,11 +29,11 @@ impl Outcome {
     /// The code of its triangles, where it is neither made nor has a tunnel; that of the case where it is made.
     #[inline(always)]
     pub(super) const fn code_or(self, case: CaseIndex) -> u16 {
-        if self.is_made() { case.0 as u16 } else { self.number() }
+        if self.is_special() { case.0 as u16 } else { self.number() }
     }
 
     const fn number(self) -> u16 {
-        self.0 & !(Self::MADE | Self::TUNNEL)
+        self.0 & !(Self::SPECIAL | Self::TUNNEL)
     }
 
     /// Its triangles, where it is made.
@@ -60,11 +60,11 @@ pub(super) const FIRST_INTERIOR: u8 = 12;
 impl Sheets {
     const NONE: Self = Self { triangles: [[0; 3]; 12], count: 0, rim: [Edge::ALL[0]; 12], rim_len: 0 };
 
-    /// The sheets of these loops, but for those whose bits are set in `left_out`.
-    pub(super) const fn new(loops: &Loops, left_out: u8) -> Self {
+    /// The sheets of these loops, but for those whose bits are set in `skipped`.
+    pub(super) const fn new(loops: &Loops, skipped: u8) -> Self {
         let (mut sheets, mut number) = (Self::NONE, 0);
         while number < loops.count {
-            if left_out >> number & 1 == 0 {
+            if skipped >> number & 1 == 0 {
                 sheets.add(loops.get(number));
             }
             number += 1;
@@ -103,22 +103,22 @@ impl Sheets {
 
 /// A case with decided faces, whose triangles are not the case's.
 #[derive(Clone, Copy)]
-struct Extra {
+struct DecidedCase {
     case: CaseIndex,
     joined: u8,
 }
 
 /// The codes of such cases follow all others.
-pub(in crate::mesher) const EXTRA_CODES: usize = TABLE.extras;
+pub(in crate::mesher) const DECIDED_CODES: usize = TABLE.decided_count;
 
 /// The case of the extra code `number`.
-pub(in crate::mesher) const fn extra_case(number: usize) -> CaseIndex {
-    TABLE.extra[number].case
+pub(in crate::mesher) const fn decided_case(number: usize) -> CaseIndex {
+    TABLE.decided[number].case
 }
 
 /// The triangles of the extra code `number`: the first so many count.
-pub(in crate::mesher) const fn extra_triangles(number: usize) -> (u8, [[Edge; 3]; 5]) {
-    let Extra { case, joined } = TABLE.extra[number];
+pub(in crate::mesher) const fn decided_triangles(number: usize) -> (u8, [[Edge; 3]; 5]) {
+    let DecidedCase { case, joined } = TABLE.decided[number];
     match triangulate(&Loops::new(case, joined)) {
         Some(triangles) => triangles,
         None => panic!("only what has triangles has a code"),
@@ -154,33 +154,33 @@ static AMBIGUOUS_FACES: [[u8; 2]; 256] = {
 };
 
 static OUTCOMES: [[Outcome; 64]; 256] = TABLE.outcomes;
-static SHEETS: [Sheets; TABLE.made] = *TABLE.sheets.split_at(TABLE.made).0.first_chunk().unwrap();
+static SHEETS: [Sheets; TABLE.sheets_count] = *TABLE.sheets.split_at(TABLE.sheets_count).0.first_chunk().unwrap();
 
-struct Table {
+struct TrilinearTable {
     /// Of sets of faces that are not all ambiguous, they mean nothing.
     outcomes: [[Outcome; 64]; 256],
     /// The first `extras` count.
-    extra: [Extra; 256],
-    extras: usize,
+    decided: [DecidedCase; 256],
+    decided_count: usize,
     /// The first `made` count.
     sheets: [Sheets; 512],
-    made: usize,
+    sheets_count: usize,
 }
 
-const TABLE: Table = {
-    let mut table = Table {
+const TABLE: TrilinearTable = {
+    let mut table = TrilinearTable {
         outcomes: [[Outcome::NONE; 64]; 256],
-        extra: [Extra { case: CaseIndex(0), joined: 0 }; 256],
-        extras: 0,
+        decided: [DecidedCase { case: CaseIndex(0), joined: 0 }; 256],
+        decided_count: 0,
         sheets: [Sheets::NONE; 512],
-        made: 0,
+        sheets_count: 0,
     };
     let mut case = 0;
     while case < 256 {
         let mut joined = 0;
         while joined < 64 {
             if joined & !(AMBIGUOUS_FACES[case][0] | AMBIGUOUS_FACES[case][1]) == 0 {
-                table.outcomes[case][joined as usize] = table.decided(CaseIndex(case as u8), joined);
+                table.outcomes[case][joined as usize] = table.add(CaseIndex(case as u8), joined);
             }
             joined += 1;
         }
@@ -189,21 +189,21 @@ const TABLE: Table = {
     table
 };
 
-impl Table {
-    const fn decided(&mut self, case: CaseIndex, joined: u8) -> Outcome {
+impl TrilinearTable {
+    const fn add(&mut self, case: CaseIndex, joined: u8) -> Outcome {
         let loops = Loops::new(case, joined);
         let tunnel = if may_have_tunnel(case, &loops) { Outcome::TUNNEL } else { 0 };
         if joined == 0 {
             return Outcome(case.0 as u16 | tunnel);
         }
         if triangulate(&loops).is_none() {
-            self.sheets[self.made] = Sheets::new(&loops, 0);
-            self.made += 1;
-            return Outcome((self.made - 1) as u16 | Outcome::MADE | tunnel);
+            self.sheets[self.sheets_count] = Sheets::new(&loops, 0);
+            self.sheets_count += 1;
+            return Outcome((self.sheets_count - 1) as u16 | Outcome::SPECIAL | tunnel);
         }
-        self.extra[self.extras] = Extra { case, joined };
-        self.extras += 1;
-        Outcome((FIRST_EXTRA as usize + self.extras - 1) as u16 | tunnel)
+        self.decided[self.decided_count] = DecidedCase { case, joined };
+        self.decided_count += 1;
+        Outcome((FIRST_FREE_CODE as usize + self.decided_count - 1) as u16 | tunnel)
     }
 }
 

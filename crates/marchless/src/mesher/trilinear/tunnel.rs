@@ -20,7 +20,7 @@
 
 #[cfg(doc)]
 use crate::simd::Simd;
-use crate::{cell::Edge, math::sqrt_f64, mesher::vertices::MARGIN};
+use crate::{cell::Edge, math::sqrt_f64, mesher::crossing::MARGIN};
 
 /// The box around a tunnel's waist: from and to, per axis, in the cell's coordinates.
 pub(super) type Waist = [[f64; 2]; 3];
@@ -33,7 +33,7 @@ const MOST: usize = 12;
 
 /// Tunnels whose waist is closer to a face of the cell are left out: floating point does not tell well enough on which
 /// side of the crossings it is.
-const LEAST_ROOM: f64 = 1.0 / (1u64 << 40) as f64;
+const MIN_FACE_DISTANCE: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// Whether a cell may have a [waist], by its faces' [larger products](Simd::larger_products): that none of the parabolas
 /// changes its sign from one face to the other.
@@ -50,8 +50,8 @@ pub(super) fn waist(weights: &[f64; 8]) -> Option<Waist> {
     // All at once: which of them fails first is anyone's guess.
     if x.has_roots_within() & y.has_roots_within() & z.has_roots_within() {
         let waist = [x, y, z].map(|parabola| parabola.roots());
-        let has_room = |&[from, to]: &[f64; 2]| from > LEAST_ROOM && to < 1.0 - LEAST_ROOM;
-        return waist.iter().all(has_room).then_some(waist);
+        let is_clear = |&[from, to]: &[f64; 2]| from > MIN_FACE_DISTANCE && to < 1.0 - MIN_FACE_DISTANCE;
+        return waist.iter().all(is_clear).then_some(waist);
     }
     None
 }
