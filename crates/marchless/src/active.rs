@@ -17,7 +17,8 @@ use crate::{
 /// `ROW_END` plus the case of a cell whose high side along x repeats these samples.
 pub(crate) const ROW_END: u16 = 256;
 
-/// The first code that [`ActiveCells::fill`] never writes. Meshers may give it and those behind it meanings of their own.
+/// The first code that [`ActiveCells::fill`] never writes. Meshers may give it and those behind it meanings of their
+/// own.
 pub(crate) const FIRST_FREE_CODE: u16 = 512;
 
 /// Words of cells that are searched together.

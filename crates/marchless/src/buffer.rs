@@ -1,28 +1,28 @@
-//! [`MeshBuffer`]: the caller's own mesh, filled again and again without allocating.
+//! [`MeshBuffer`]: the caller's mesh, filled again and again without allocating.
 
 use alloc::vec::Vec;
 
-/// An indexed triangle mesh, kept by the caller and reused from mesh to mesh.
+/// An indexed triangle mesh that the caller keeps and reuses.
 ///
-/// Vertices are shared between triangles. A triangle's corners run counter-clockwise when seen from outside (from
-/// the side of larger weights). Clearing keeps the memory, so that nothing is allocated once it is warm.
+/// Triangles share vertices. A triangle's corners run counter-clockwise when seen from outside (from the side of larger
+/// weights). Clearing keeps the memory, so a warm buffer allocates nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshBuffer {
-    /// One position a vertex, in cells from the first meshed sample.
+    /// One position per vertex, in cells from the first meshed sample.
     pub positions: Vec<[f32; 3]>,
-    /// One unit normal a vertex, pointing outside; empty where normals were switched off.
+    /// One unit normal per vertex, pointing outside; empty if the settings turn normals off.
     pub normals: Vec<[f32; 3]>,
-    /// One material a vertex, that of the inside end of its edge (in the interior of a cell: of the nearest inside
-    /// corner); empty where the samples had none.
+    /// One material per vertex: that of the inside end of its edge, or of the nearest inside corner for a vertex in the
+    /// interior of a cell. Empty if the samples have no materials.
     pub materials: Vec<u8>,
-    /// Three a triangle.
+    /// Three vertex indices per triangle.
     pub indices: Vec<u32>,
-    /// The smallest box that holds all positions: `[min, max]`; `None` where there are none.
+    /// The smallest box that holds all positions, `[min, max]`; `None` if there are none.
     pub bounds: Option<[[f32; 3]; 2]>,
 }
 
 impl MeshBuffer {
-    /// An empty buffer; allocates nothing.
+    /// An empty buffer. It allocates nothing.
     pub const fn new() -> Self {
         Self { positions: Vec::new(), normals: Vec::new(), materials: Vec::new(), indices: Vec::new(), bounds: None }
     }
@@ -36,7 +36,7 @@ impl MeshBuffer {
         self.bounds = None;
     }
 
-    /// Whether there is no triangle.
+    /// True if there is no triangle.
     pub const fn is_empty(&self) -> bool {
         self.indices.is_empty()
     }
@@ -46,7 +46,7 @@ impl MeshBuffer {
         self.indices.len() / 3
     }
 
-    /// The triangles' vertex indices.
+    /// The vertex indices of each triangle.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
         self.indices.chunks_exact(3).map(|triangle| [triangle[0], triangle[1], triangle[2]])
     }

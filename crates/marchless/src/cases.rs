@@ -1,15 +1,15 @@
 //! The 256 cases of a cell, derived at compile time from one rule for its faces.
 //!
-//! On each face the crossings are joined so that **inside corners are separated** where they stand diagonally: every
-//! run of inside corners around the face is cut off by a segment of its own. Both cells at a face see the same
-//! corners, draw the same segments, and so fit. The segments of six faces close into loops of 3 to 7
-//! crossings, and each loop becomes a fan around the first crossing from which no diagonal lies in a face of
-//! the cell: such a diagonal could coincide with an edge of the neighbour's and be shared by four triangles. Every
-//! loop has such a fan, and its triangles never cross one another or those of another loop, wherever on their edges
-//! the crossings lie: the tests show both. 820 triangles in all, at most 5 a case.
+//! The rule: **inside corners are separated** if they are diagonal to each other on a face. A segment of its own cuts
+//! off every run of inside corners around the face. Both cells at a face see the same corners and draw the same
+//! segments, so they fit. The segments of six faces close into loops of 3 to 7 crossings. Each loop becomes a fan
+//! around the first crossing from which no diagonal lies in a face of the cell: such a diagonal could coincide with an
+//! edge in the neighbouring cell, which four triangles would then share. Every loop has such a fan, and its triangles
+//! never cross each other or those of another loop, wherever on their edges the crossings lie: the tests show both.
+//! There are 820 triangles in all, at most 5 per case.
 //!
-//! Refused: any triangulation that avoids face diagonals. Of the 16 that a loop of seven crossings has, 4 have
-//! triangles that cross; the 3 that are fans do not.
+//! Refused: any other triangulation that avoids face diagonals. A loop of seven crossings has 16 such triangulations;
+//! the triangles of 4 cross each other, those of the 3 fans do not.
 //!
 //! The face rule is that of the regular cells in Eric Lengyel, "Voxel-Based Terrain for Real-Time Virtual Simulations"
 //! (2010); the cases themselves go back to William E. Lorensen and Harvey E. Cline, "Marching Cubes: A High Resolution
@@ -17,15 +17,16 @@
 
 use crate::cell::{CaseIndex, Corner, Edge, Face};
 
-/// Triangles of each case, 0–5.
+/// The number of triangles of each case, 0–5.
 pub const TRIANGLE_COUNTS: [u8; 256] = CASES.counts;
 
-/// The edges that hold the corners of each case's triangles, counter-clockwise as seen from outside; the first
-/// [`TRIANGLE_COUNTS`] entries count, the others are edge 0 three times.
+/// The triangles of each case. Corners are named by their edges, counter-clockwise as seen from outside.
+///
+/// The first [`TRIANGLE_COUNTS`] entries of a case are in use; the others are edge 0 three times.
 pub static TRIANGLES: [[[Edge; 3]; 5]; 256] = CASES.triangles;
 
 impl CaseIndex {
-    /// The triangles of this case, each corner named by the edge that it lies on.
+    /// The triangles of this case. Corners are named by the edges that they lie on.
     pub const fn triangles(self) -> &'static [[Edge; 3]] {
         let (used, _) = TRIANGLES[self.0 as usize].split_at(TRIANGLE_COUNTS[self.0 as usize] as usize);
         used
@@ -42,7 +43,7 @@ pub const EDGE_CORNERS: [[Corner; 2]; 12] = {
     corners
 };
 
-/// The edges that the surface crosses in each case: bit `i` is edge `i`.
+/// The edges that the surface crosses in each case. Bit `i` is edge `i`.
 pub const CROSSED_EDGES: [u16; 256] = {
     let (mut crossed, mut case) = ([0; 256], 0);
     while case < 256 {
@@ -83,8 +84,8 @@ impl Cases {
     }
 }
 
-/// The triangles of these loops as fans around crossings: at most 5, of which the first so many count. `None` where
-/// there are more, or where some loop has no fan.
+/// The number of triangles of these loops, and the triangles themselves, as fans around crossings. `None` if there are
+/// more than 5, or if a loop has no fan.
 pub(crate) const fn triangulate(loops: &Loops) -> Option<(u8, [[Edge; 3]; 5])> {
     let (mut count, mut triangles, mut number) = (0, [[Edge::ALL[0]; 3]; 5], 0);
     while number < loops.count {
@@ -105,19 +106,19 @@ pub(crate) const fn triangulate(loops: &Loops) -> Option<(u8, [[Edge; 3]; 5])> {
     Some((count as u8, triangles))
 }
 
-/// The loops that the surface's segments on the faces of a cell close into.
+/// The loops that the surface's segments on the faces of a cell form.
 #[derive(Clone, Copy)]
 pub(crate) struct Loops {
-    /// One loop behind the other, each with the inside to its left as seen from outside the cell.
+    /// The crossings of all loops, loop after loop. As seen from outside the cell, the inside is to the left of a loop.
     crossings: [Edge; 12],
-    /// Where each loop ends.
+    /// The end of each loop in `crossings`.
     ends: [usize; 4],
     pub(crate) count: usize,
 }
 
 impl Loops {
-    /// Joins the crossings face by face and follows them. `joined`: a bit for each face on which inside corners that
-    /// stand diagonally are joined instead of separated; of faces that are not ambiguous, it means nothing.
+    /// Joins the crossings face by face and follows them around. `joined`: the ambiguous faces on which inside corners
+    /// are joined instead of separated, a bit each; bits of other faces are ignored.
     pub(crate) const fn new(case: CaseIndex, joined: u8) -> Self {
         let next = next_crossings(case, joined);
         let mut loops = Self { crossings: [Edge::ALL[0]; 12], ends: [0; 4], count: 0 };
@@ -151,7 +152,7 @@ impl Loops {
     }
 }
 
-/// For each crossed edge, the one that follows it on a loop.
+/// The crossed edge that follows each crossed edge on its loop.
 const fn next_crossings(case: CaseIndex, joined: u8) -> [Option<Edge>; 12] {
     let (mut next, mut face) = ([None; 12], 0);
     while face < 6 {
@@ -159,7 +160,7 @@ const fn next_crossings(case: CaseIndex, joined: u8) -> [Option<Edge>; 12] {
         let outside_is_cut_off = case.is_ambiguous(Face::ALL[face]) && joined >> face & 1 == 1;
         let mut start = 0;
         while start < 4 {
-            // A run of inside corners begins behind an outside one, and ends before the next.
+            // A run of inside corners begins behind an outside corner and ends before the next one.
             if !case.is_inside(corners[start]) && case.is_inside(corners[(start + 1) % 4]) {
                 let entry = Edge::between(corners[start], corners[(start + 1) % 4]);
                 let mut end = if outside_is_cut_off { (start + 3) % 4 } else { (start + 1) % 4 };
@@ -175,7 +176,7 @@ const fn next_crossings(case: CaseIndex, joined: u8) -> [Option<Edge>; 12] {
     next
 }
 
-/// The first crossing of the loop whose fan has no diagonal in a face of the cell, if there is one.
+/// The index of the first crossing of a loop whose fan has no diagonal in a face of the cell, if there is one.
 pub(crate) const fn fan_apex(crossings: &[Edge]) -> Option<usize> {
     let (len, mut apex) = (crossings.len(), 0);
     while apex < len {

@@ -1,4 +1,4 @@
-//! The parts of a cell, numbered: corners, edges, faces, and the case index that its corners' signs make.
+//! The numbered parts of a cell: corners, edges and faces, and the case index of its corners' signs.
 //!
 //! ```text
 //!        6────────e3────────7          z  y
@@ -19,22 +19,24 @@
 pub struct Corner(u8);
 
 impl Corner {
-    /// All eight.
+    /// All eight corners.
     pub const ALL: [Self; 8] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5), Self(6), Self(7)];
 
+    /// The corner number `index`.
+    ///
     /// # Panics
-    /// Where `index` is not below 8.
+    /// If `index` is not below 8.
     pub const fn new(index: u8) -> Self {
         assert!(index < 8, "a cell has eight corners");
         Self(index)
     }
 
-    /// 0–7.
+    /// The corner's number, 0–7.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// Its place in the cell, each coordinate 0 or 1.
+    /// The corner's position in the cell; each coordinate is 0 or 1.
     pub const fn offset(self) -> [u8; 3] {
         [self.0 & 1, self.0 >> 1 & 1, self.0 >> 2]
     }
@@ -46,7 +48,7 @@ impl Corner {
 pub struct Edge(u8);
 
 impl Edge {
-    /// All twelve.
+    /// All twelve edges.
     pub const ALL: [Self; 12] = {
         let mut all = [Self(0); 12];
         let mut index = 0;
@@ -57,8 +59,10 @@ impl Edge {
         all
     };
 
+    /// The edge number `index`.
+    ///
     /// # Panics
-    /// Where `index` is not below 12.
+    /// If `index` is not below 12.
     pub const fn new(index: u8) -> Self {
         assert!(index < 12, "a cell has twelve edges");
         Self(index)
@@ -67,7 +71,7 @@ impl Edge {
     /// The edge between two corners.
     ///
     /// # Panics
-    /// Where the corners are not neighbours.
+    /// If the corners are not neighbours.
     pub const fn between(a: Corner, b: Corner) -> Self {
         let low = a.0 & b.0;
         match a.0 ^ b.0 {
@@ -78,17 +82,17 @@ impl Edge {
         }
     }
 
-    /// 0–11.
+    /// The edge's number, 0–11.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// The axis that it runs along: 0 x, 1 y, 2 z.
+    /// The axis that the edge runs along: 0 x, 1 y, 2 z.
     pub const fn axis(self) -> usize {
         self.0 as usize / 4
     }
 
-    /// Its two ends, the lower first.
+    /// The two ends of the edge, the lower first.
     pub const fn corners(self) -> [Corner; 2] {
         let (first, second) = (self.0 & 1, self.0 >> 1 & 1);
         match self.axis() {
@@ -98,12 +102,12 @@ impl Edge {
         }
     }
 
-    /// Whether some face of the cell holds both edges.
+    /// True if both edges lie on one face of the cell.
     pub const fn shares_face(self, other: Self) -> bool {
         self.faces() & other.faces() != 0
     }
 
-    /// The two faces that hold it, a bit each.
+    /// The two faces that the edge lies on, a bit each.
     const fn faces(self) -> u8 {
         let (mut faces, mut face) = (0, 0);
         let [low, high] = self.corners();
@@ -122,32 +126,34 @@ impl Edge {
 pub struct Face(u8);
 
 impl Face {
-    /// All six.
+    /// All six faces.
     pub const ALL: [Self; 6] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
 
+    /// The face number `index`.
+    ///
     /// # Panics
-    /// Where `index` is not below 6.
+    /// If `index` is not below 6.
     pub const fn new(index: u8) -> Self {
         assert!(index < 6, "a cell has six faces");
         Self(index)
     }
 
-    /// 0–5.
+    /// The face's number, 0–5.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// The axis that it stands across: 0 x, 1 y, 2 z.
+    /// The axis that the face is perpendicular to: 0 x, 1 y, 2 z.
     pub const fn axis(self) -> usize {
         self.0 as usize / 2
     }
 
-    /// Whether it lies on the high side of its axis.
+    /// True if the face lies on the high side of its axis.
     pub const fn is_high(self) -> bool {
         self.0 & 1 == 1
     }
 
-    /// Its corners, counter-clockwise as seen from outside the cell.
+    /// The corners of the face, counter-clockwise as seen from outside the cell.
     pub const fn corners(self) -> [Corner; 4] {
         let (across, u, v) = (1u8 << self.axis(), 1u8 << ((self.axis() + 1) % 3), 1u8 << ((self.axis() + 2) % 3));
         if self.is_high() {
@@ -157,30 +163,30 @@ impl Face {
         }
     }
 
-    /// Whether `corner` is one of its four.
+    /// True if `corner` is one of the face's four.
     pub const fn holds(self, corner: Corner) -> bool {
         (corner.0 >> self.axis() & 1 == 1) == self.is_high()
     }
 }
 
-/// Which of a cell's corners are inside: bit `i` is corner `i`.
+/// The set of a cell's corners that are inside. Bit `i` is corner `i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CaseIndex(pub u8);
 
 impl CaseIndex {
-    /// Whether `corner` is inside.
+    /// True if `corner` is inside.
     pub const fn is_inside(self, corner: Corner) -> bool {
         self.0 >> corner.0 & 1 == 1
     }
 
-    /// Whether the surface crosses `edge`.
+    /// True if the surface crosses `edge`.
     pub const fn crosses(self, edge: Edge) -> bool {
         let [low, high] = edge.corners();
         self.is_inside(low) != self.is_inside(high)
     }
 
-    /// Whether the corners of `face` alternate between inside and outside, so that their signs alone do not tell how its
-    /// four crossings are joined.
+    /// True if the corners of `face` alternate between inside and outside. Their signs then leave open how the four
+    /// crossings are joined.
     pub const fn is_ambiguous(self, face: Face) -> bool {
         let [a, b, c, d] = face.corners();
         self.is_inside(a) == self.is_inside(c)

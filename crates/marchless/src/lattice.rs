@@ -1,10 +1,10 @@
-//! Lattices: how many samples there are per axis, where each lies in memory, and a borrowed view of them.
+//! Lattices: samples per axis, their order in memory, boxes of lattice points, and a borrowed view of samples.
 
 use core::fmt;
 
 use thiserror::Error;
 
-/// Samples per axis, x fastest: the sample at `[x, y, z]` has index `x + nx·(y + ny·z)`.
+/// The size of a lattice in samples per axis, x fastest: the sample at `[x, y, z]` has index `x + nx·(y + ny·z)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shape([u32; 3]);
 
@@ -12,7 +12,7 @@ impl Shape {
     /// A shape of `size` samples per axis.
     ///
     /// # Errors
-    /// [`ShapeError`] where an axis is zero or the product of all three overflows `usize`.
+    /// [`ShapeError`] if an axis is zero, or if memory could not address all samples.
     pub const fn new(size: [u32; 3]) -> Result<Self, ShapeError> {
         if size[0] == 0 || size[1] == 0 || size[2] == 0 {
             return Err(ShapeError::Empty { size });
@@ -26,26 +26,26 @@ impl Shape {
         }
     }
 
-    /// The same number of samples on every axis.
+    /// A shape of `size` samples on every axis.
     ///
     /// # Errors
-    /// As [`Shape::new`].
+    /// Those of [`Shape::new`].
     pub const fn cube(size: u32) -> Result<Self, ShapeError> {
         Self::new([size; 3])
     }
 
-    /// Samples per axis.
+    /// The samples per axis.
     pub const fn size(self) -> [u32; 3] {
         self.0
     }
 
-    /// All samples; never 0.
+    /// The number of all samples; never 0.
     #[expect(clippy::len_without_is_empty, reason = "a shape is never empty")]
     pub const fn len(self) -> usize {
         self.0[0] as usize * self.0[1] as usize * self.0[2] as usize
     }
 
-    /// How far apart in memory neighbours along x, y and z are: `[1, nx, nx·ny]`.
+    /// The distance in memory between neighbours along x, y and z: `[1, nx, nx·ny]`.
     pub const fn strides(self) -> [usize; 3] {
         [1, self.0[0] as usize, self.0[0] as usize * self.0[1] as usize]
     }
@@ -53,7 +53,7 @@ impl Shape {
     /// The index of the sample at `position`, which must lie within the shape.
     ///
     /// # Panics
-    /// In debug builds, where it does not.
+    /// In debug builds, if `position` lies outside.
     pub const fn index(self, position: [u32; 3]) -> usize {
         debug_assert!(position[0] < self.0[0] && position[1] < self.0[1] && position[2] < self.0[2]);
         let [sx, sy, sz] = self.strides();
@@ -67,57 +67,57 @@ impl fmt::Display for Shape {
     }
 }
 
-/// Why a size is not a [`Shape`].
+/// The reason why a size is not a [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ShapeError {
     /// An axis has no samples.
     #[error("a lattice needs at least one sample per axis, but its size is {} × {} × {}", size[0], size[1], size[2])]
     Empty {
-        /// What was given.
+        /// The size that was given.
         size: [u32; 3],
     },
-    /// The samples could not be addressed.
+    /// Memory could not address all samples.
     #[error("a lattice of {} × {} × {} samples does not fit in memory", size[0], size[1], size[2])]
     TooLarge {
-        /// What was given.
+        /// The size that was given.
         size: [u32; 3],
     },
 }
 
-/// A box of lattice points (or of chunks): `min` belongs to it, `max` does not.
+/// A box of lattice points (or of chunks) that includes `min` and excludes `max`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Region {
     /// The lowest point.
     pub min: [i32; 3],
-    /// One past the highest point.
+    /// One past the highest point, on each axis.
     pub max: [i32; 3],
 }
 
 impl Region {
-    /// The region from `min` up to, but without, `max`.
+    /// The region from `min` (included) to `max` (excluded).
     pub const fn new(min: [i32; 3], max: [i32; 3]) -> Self {
         Self { min, max }
     }
 
-    /// Whether no point lies in it.
+    /// True if the region has no point.
     pub const fn is_empty(&self) -> bool {
         self.max[0] <= self.min[0] || self.max[1] <= self.min[1] || self.max[2] <= self.min[2]
     }
 
-    /// Points per axis; 0 on each axis where it is empty.
+    /// The points per axis; 0 on each axis where the region is empty.
     pub fn size(&self) -> [u32; 3] {
         core::array::from_fn(|axis| {
             (i64::from(self.max[axis]) - i64::from(self.min[axis])).clamp(0, i64::from(u32::MAX)) as u32
         })
     }
 
-    /// Whether `point` lies in it.
+    /// True if `point` lies in the region.
     pub fn contains(&self, point: [i32; 3]) -> bool {
         (0..3).all(|axis| (self.min[axis]..self.max[axis]).contains(&point[axis]))
     }
 
-    /// What both regions have in common; possibly empty.
+    /// The intersection of both regions; it may be empty.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
         Self {
@@ -126,7 +126,7 @@ impl Region {
         }
     }
 
-    /// The smallest region that holds both; an empty one adds nothing.
+    /// The smallest region that holds both; an empty region adds nothing.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         if self.is_empty() {
@@ -141,7 +141,8 @@ impl Region {
         }
     }
 
-    /// The region grown by `low` points below and `high` points above, saturating at the ends of `i32`.
+    /// The region grown by `low` points below and `high` points above, on each axis. It saturates at the limits of
+    /// `i32`.
     #[must_use]
     pub fn grown(&self, low: u32, high: u32) -> Self {
         Self {
@@ -150,7 +151,7 @@ impl Region {
         }
     }
 
-    /// Every point, x fastest.
+    /// All points, x fastest.
     pub fn points(self) -> impl Iterator<Item = [i32; 3]> {
         let x_range = self.min[0]..self.max[0];
         (self.min[2]..self.max[2]).flat_map(move |z| {
@@ -160,7 +161,7 @@ impl Region {
     }
 }
 
-/// A borrowed view of samples to be meshed: weights, and materials where there are any.
+/// A borrowed view of samples to be meshed: weights and optional materials.
 ///
 /// ```
 /// use marchless::{Samples, Shape};
@@ -178,12 +179,12 @@ pub struct Samples<'a, W> {
 }
 
 impl<'a, W> Samples<'a, W> {
-    /// Samples of `shape`, all of whose cells are meshed; at the border the gradient is one-sided.
+    /// Samples of `shape`. All their cells are meshed; at the border the gradient is one-sided.
     ///
     /// `weights`: `[nx·ny·nz]`, x fastest.
     ///
     /// # Errors
-    /// [`SamplesError::WeightsLength`] where the slice's length is not the shape's.
+    /// [`SamplesError::WeightsLength`] if the slice's length is not the shape's.
     pub const fn new(shape: Shape, weights: &'a [W]) -> Result<Self, SamplesError> {
         if weights.len() != shape.len() {
             return Err(SamplesError::WeightsLength { shape, expected: shape.len(), found: weights.len() });
@@ -191,12 +192,12 @@ impl<'a, W> Samples<'a, W> {
         Ok(Self { shape, weights, materials: None, padded: false })
     }
 
-    /// The same samples with a material for each.
+    /// Adds a material to each sample.
     ///
     /// `materials`: `[nx·ny·nz]`, x fastest.
     ///
     /// # Errors
-    /// [`SamplesError::MaterialsLength`] where the slice's length is not the shape's.
+    /// [`SamplesError::MaterialsLength`] if the slice's length is not the shape's.
     pub const fn with_materials(self, materials: &'a [u8]) -> Result<Self, SamplesError> {
         if materials.len() != self.shape.len() {
             let (shape, expected) = (self.shape, self.shape.len());
@@ -205,15 +206,16 @@ impl<'a, W> Samples<'a, W> {
         Ok(Self { materials: Some(materials), ..self })
     }
 
-    /// The same samples, the outermost layer of which is padding: it is read for gradients, but not meshed.
-    /// Positions are then relative to the sample at `[1, 1, 1]`, and two blocks that overlap in their padding agree
-    /// on their shared border bit for bit.
+    /// Makes the outermost layer of samples padding: gradients read it, but its cells are not meshed.
+    ///
+    /// Positions are then relative to the sample at `[1, 1, 1]`. Two blocks that overlap in their padding agree on
+    /// their shared border bit for bit.
     #[must_use]
     pub const fn padded(self) -> Self {
         Self { padded: true, ..self }
     }
 
-    /// Samples per axis, padding included.
+    /// The samples per axis, padding included.
     pub const fn shape(&self) -> Shape {
         self.shape
     }
@@ -223,22 +225,22 @@ impl<'a, W> Samples<'a, W> {
         self.weights
     }
 
-    /// The materials, x fastest, where there are any.
+    /// The materials, x fastest, if there are any.
     pub const fn materials(&self) -> Option<&'a [u8]> {
         self.materials
     }
 
-    /// Whether the outermost layer is padding.
+    /// True if the outermost layer is padding.
     pub const fn is_padded(&self) -> bool {
         self.padded
     }
 }
 
-/// Why slices are not [`Samples`] of a shape.
+/// The reason why slices are not [`Samples`] of a shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SamplesError {
-    /// The weights do not fill the shape.
+    /// The number of weights is not the shape's.
     #[error("{shape} samples need {expected} weights, but there are {found}")]
     WeightsLength {
         /// The shape.
@@ -248,7 +250,7 @@ pub enum SamplesError {
         /// The slice's length.
         found: usize,
     },
-    /// The materials do not fill the shape.
+    /// The number of materials is not the shape's.
     #[error("{shape} samples need {expected} materials, but there are {found}")]
     MaterialsLength {
         /// The shape.

@@ -1,4 +1,4 @@
-//! The square root, which `core` lacks. It is exact in IEEE 754, so that both versions give the same bits.
+//! The square root, which `core` lacks. IEEE 754 rounds it exactly, so both versions give the same bits.
 
 #[inline(always)]
 pub(crate) fn sqrt(value: f32) -> f32 {

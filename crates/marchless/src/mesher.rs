@@ -6,10 +6,9 @@
 //!                                          └─4 triangles─▶ one visit per active cell between two slabs
 //! ```
 //!
-//! [`signs`](crate::signs) and [`active`](crate::active) hold what all meshers share. Upon them stand the marching-cubes
-//! passes (`primal`), and beside these [`Topology::Trilinear`] (`trilinear`), which decides by their weights the cells
-//! that signs leave ambiguous. All passes work on one slab of samples after the other, while it is in the cache
-//! (`pipeline`).
+//! All meshers share [`signs`](crate::signs) and [`active`](crate::active). The marching-cubes passes (`primal`) build on
+//! them. For [`Topology::Trilinear`], `trilinear` decides ambiguous cells by their weights. The passes work on one slab
+//! of samples after the other, while it is in the cache (`pipeline`).
 //!
 //! Vertices are numbered slab by slab: first those on edges along z from the slab below, then those in the interior of
 //! cells, then those on edges along x, then those along y, each row by row. Triangles follow the cells, x fastest.
@@ -41,14 +40,15 @@ pub use stream::SlabMesher;
 #[cfg(feature = "std")]
 pub use threads::ThreadedMesher;
 
-/// Turns samples into meshes; keeps its scratch memory between them.
+/// Turns samples into meshes. It keeps its scratch memory from mesh to mesh.
 ///
 /// The surface is closed, 2-manifold, consistently oriented and free of zero-area triangles on every input, except
-/// where it leaves the meshed box, and up to 4,096 cells per axis (`f32` positions have no room for the clamp beyond).
-/// Crossings keep 1/1024 of their edge away from its ends. NaN samples count as outside, infinite ones by their sign;
-/// all positions and normals are finite whatever the samples are. The same samples give the same mesh, bit for bit.
+/// where it leaves the meshed box. This holds up to 4,096 cells per axis; beyond, `f32` positions are too coarse for
+/// the clamp. Crossings stay at least 1/1024 of their edge away from its ends. NaN samples count as outside, infinite
+/// ones by their sign; all positions and normals are finite on every input. The same samples give the same mesh, bit
+/// for bit.
 ///
-/// Not guaranteed: triangles of a good shape.
+/// Not guaranteed: well-shaped triangles.
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape};
@@ -77,21 +77,22 @@ pub struct Mesher {
 }
 
 impl Mesher {
-    /// A mesher that has allocated nothing yet, and will use the [fastest](Backend::fastest) backend.
+    /// A mesher that uses the [fastest](Backend::fastest) backend. It allocates nothing until the first mesh.
     pub const fn new() -> Self {
         Self { backend: None, pipeline: SlabPipeline::new() }
     }
 
-    /// A mesher that uses `backend`; the portable one where it is not [available](Backend::is_available).
+    /// A mesher that uses `backend`, or the portable one if that is not [available](Backend::is_available).
     pub const fn with_backend(backend: Backend) -> Self {
         Self { backend: Some(backend), pipeline: SlabPipeline::new() }
     }
 
-    /// Meshes `samples` into `out`, whose former content is dropped. No surface is no error: `out` is then empty.
+    /// Meshes `samples` into `out` and drops its former content. Samples without a surface are no error: `out` is then
+    /// empty.
     ///
     /// # Errors
-    /// [`MeshError`] where there is no cell to mesh, the isovalue is not finite, or vertices would outnumber `u32`
-    /// indices; `out` is then empty.
+    /// [`MeshError`] if there is no cell to mesh, the isovalue is not finite, or `u32` indices cannot number all
+    /// vertices. `out` is then empty.
     pub fn mesh<W: Weight>(
         &mut self,
         samples: Samples<'_, W>,

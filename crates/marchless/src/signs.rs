@@ -31,8 +31,8 @@ impl SignSweep {
         Self { slabs: [SlabSigns::new(), SlabSigns::new(), SlabSigns::new()] }
     }
 
-    /// Moves up by one slab. `first` is the current slab where the sweep starts there; `next` is the slab above, if there
-    /// is one. Both are whole slabs, padding included.
+    /// Moves up by one slab. `first`: the current slab, if the sweep starts with it. `next`: the slab above, if there is
+    /// one. Both are whole slabs, padding included.
     #[inline(always)]
     pub(crate) fn advance<S: Simd, W: Weight>(
         &mut self,
@@ -51,8 +51,8 @@ impl SignSweep {
         }
     }
 
-    /// Returns whether any sign of the current slab or the one below differs from another. If so, writes out the words of
-    /// both.
+    /// Writes out the words of the slab below and of the current slab, and returns true, unless all signs of both are
+    /// equal.
     #[inline(always)]
     pub(crate) fn write_out_pair(&mut self, layout: &SlabLayout) -> bool {
         let [below, current, _] = &mut self.slabs;

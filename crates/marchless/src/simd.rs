@@ -1,17 +1,18 @@
-//! Backends: the few steps of meshing that a processor's vector instructions do better than a compiler's.
+//! Backends: the few steps of meshing for which a processor has better vector instructions than a compiler finds.
 //!
-//! One interface ([`Simd`]), one file a backend, and no `cfg(target_arch)` elsewhere. Everything that is generic over a
-//! backend is inlined into [`dispatch`]'s functions, which switch the instructions on, so that the plain loops between
-//! these steps are vectorised for the same processor. All backends give the same bits: comparisons, copies, and
-//! operations that IEEE 754 rounds exactly; no fused multiply-add, no reciprocal estimates.
+//! There is one interface ([`Simd`]), one file per backend, and no `cfg(target_arch)` elsewhere. All code that is
+//! generic over a backend is inlined into the functions that [`dispatch`] calls, which enable the instructions. So the
+//! compiler vectorises the plain loops between these steps for the same processor. All backends give the same bits:
+//! they use comparisons, copies, and operations that IEEE 754 rounds exactly, but no fused multiply-add and no
+//! reciprocal estimates.
 //!
-//! Refused, with times of one row of 33 of 35 `i16` samples made signs (AMD EPYC, Zen 4; 1.3 ns here with AVX2, 1.4 ns
-//! with AVX-512, 2.6 ns with SSE2):
-//! - loops that the compiler vectorises: 3.5 ns, and no faster with AVX2 switched on;
-//! - `wide`: 1.9 ns; chooses its instructions when it is compiled, not at run time;
-//! - `pulp`: 1.4 to 1.5 ns, but comparisons to bits and permutations only in its parts for one level of x86 each;
-//! - `fearless_simd`: 1.4 to 2.9 ns; as fast as this where its `kernel!` leads to the same intrinsics, which is then
-//!   all that it would be needed for.
+//! Refused, with times for the signs of one row of 33 of 35 `i16` samples (AMD EPYC, Zen 4; 1.3 ns here with AVX2, 1.4
+//! ns with AVX-512, 2.6 ns with SSE2):
+//! - loops that the compiler vectorises: 3.5 ns, and no faster with AVX2 enabled;
+//! - `wide`: 1.9 ns; it chooses its instructions at compile time, not at run time;
+//! - `pulp`: 1.4 to 1.5 ns, but it has comparisons to bits and permutations only in its parts for single x86 levels;
+//! - `fearless_simd`: 1.4 to 2.9 ns; as fast as this only where its `kernel!` leads to the same intrinsics, and it
+//!   would serve for nothing else.
 
 use core::{marker::PhantomData, mem::MaybeUninit};
 
@@ -31,25 +32,25 @@ mod sse2;
 
 pub(crate) use words::Words;
 
-/// Which instructions meshing uses. The meshes are the same, bit for bit, whichever it is.
+/// The instructions that meshing uses. All backends make the same meshes, bit for bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Backend {
-    /// Words and plain loops; on every machine.
+    /// Words and plain loops; available on every machine.
     Portable,
-    /// What every x86-64 has, but for targets without floating-point registers.
+    /// SSE2: every x86-64 target has it, except those without floating-point registers.
     Sse2,
     /// AVX2 with BMI1, BMI2, LZCNT and POPCNT: Intel since Haswell, AMD since Excavator.
     Avx2,
-    /// AVX-512 F, BW, DQ, VL and VBMI2 on top of it: Intel since Ice Lake, AMD since Zen 4.
+    /// AVX-512 F, BW, DQ, VL and VBMI2 on top of [`Backend::Avx2`]: Intel since Ice Lake, AMD since Zen 4.
     Avx512,
 }
 
 impl Backend {
-    /// All of them, the slowest first.
+    /// All backends, the slowest first.
     pub const ALL: &'static [Self] = &[Self::Portable, Self::Sse2, Self::Avx2, Self::Avx512];
 
-    /// A short name in lower case.
+    /// The short name of the backend, in lower case.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
@@ -59,13 +60,13 @@ impl Backend {
         }
     }
 
-    /// The fastest that is [available](Self::is_available).
+    /// The fastest backend that is [available](Self::is_available).
     pub fn fastest() -> Self {
         Self::ALL.iter().rfind(|backend| backend.is_available()).copied().unwrap_or(Self::Portable)
     }
 
-    /// Whether the processor has these instructions (without the feature `std`: whether the crate was compiled for
-    /// them).
+    /// True if the processor has these instructions. Without the feature `std`: true if the crate was compiled for
+    /// them.
     pub fn is_available(self) -> bool {
         match self {
             Self::Portable => true,
@@ -81,7 +82,7 @@ impl Backend {
     }
 }
 
-/// `all(NAME…)`: whether all these features can be used.
+/// `all!(NAME…)`: true if all these features can be used.
 #[cfg(all(target_arch = "x86_64", feature = "std"))]
 macro_rules! all {
     ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
@@ -93,14 +94,14 @@ macro_rules! all {
 #[cfg(target_arch = "x86_64")]
 use all;
 
-/// Work that some backend does.
+/// Work that runs on a backend.
 pub(crate) trait Job {
     type Output;
-    /// Must be `#[inline(always)]`, down to the last function that is generic over `S`.
+    /// Does the work. This function, and every function generic over `S` that it calls, must be `#[inline(always)]`.
     fn run<S: Simd>(self) -> Self::Output;
 }
 
-/// Does `job` with `backend`, or with the portable one where that is not available.
+/// Runs `job` on `backend`, or on the portable one if that is not available.
 pub(crate) fn dispatch<J: Job>(backend: Backend, job: J) -> J::Output {
     match backend {
         #[cfg(target_arch = "x86_64")]
@@ -109,13 +110,13 @@ pub(crate) fn dispatch<J: Job>(backend: Backend, job: J) -> J::Output {
     }
 }
 
-/// [`dispatch`] for loops over words: SSE2 has no instruction of use to them that the compiler does not find.
+/// [`dispatch`] for loops over words. It has no SSE2 version: the compiler finds all useful instructions there.
 pub(crate) fn dispatch_words<J: Job>(backend: Backend, job: J) -> J::Output {
     match backend {
         #[cfg(target_arch = "x86_64")]
         Backend::Avx2 if backend.is_available() => {
             // SAFETY: the processor has the instructions.
-            #[expect(unsafe_code, reason = "the one place where instructions are switched on")]
+            #[expect(unsafe_code, reason = "the one place where instructions are enabled")]
             unsafe {
                 avx2::run(job)
             }
@@ -123,7 +124,7 @@ pub(crate) fn dispatch_words<J: Job>(backend: Backend, job: J) -> J::Output {
         #[cfg(target_arch = "x86_64")]
         Backend::Avx512 if backend.is_available() => {
             // SAFETY: the processor has the instructions.
-            #[expect(unsafe_code, reason = "the one place where instructions are switched on")]
+            #[expect(unsafe_code, reason = "the one place where instructions are enabled")]
             unsafe {
                 avx512::run(job)
             }
@@ -132,33 +133,33 @@ pub(crate) fn dispatch_words<J: Job>(backend: Backend, job: J) -> J::Output {
     }
 }
 
-/// What the backends do each in their way. [`portable`] is the plain version that the tests hold the others to.
+/// The steps that each backend implements. [`portable`] is the plain version; the tests compare the others with it.
 pub(crate) trait Simd {
-    /// Eight words in registers.
+    /// The type of eight words in registers.
     type Eight: Eight;
 
-    /// One bit a weight, set where it is below `threshold`.
+    /// The weights below `threshold`, a bit each.
     fn below_i8(weights: &[i8; 32], threshold: i8) -> u32;
-    /// One bit a weight, set where it is below `threshold`.
+    /// The weights below `threshold`, a bit each.
     fn below_i16(weights: &[i16; 32], threshold: i16) -> u32;
-    /// One bit a weight, set where it is below `threshold`; NaN is not.
+    /// The weights below `threshold`, a bit each. NaN is not below.
     fn below_f32(weights: &[f32; 32], threshold: f32) -> u32;
 
-    /// Which words are not zero, a bit each; `words`: a multiple of eight, at most 64.
+    /// The nonzero words, a bit each. The number of words is a multiple of eight, at most 64.
     fn nonzero(words: &[u64]) -> u64;
 
-    /// Writes the positions of the set bits of `word`, lowest first, each plus `base`, to `positions`, and `row` for
-    /// each to `rows`; returns how many there are. What is written behind them means nothing.
+    /// Writes `base` plus the number of each set bit of `word` to `positions`, lowest first, and `row` for each to
+    /// `rows`. Returns the number of set bits. Items behind them may be overwritten.
     fn positions(word: u64, base: u32, row: u32, positions: &mut [u32; 64], rows: &mut [u32; 64]) -> usize;
 
-    /// Writes the case of each cell whose bit is set in `active`, lowest first, to `cases`; returns how many there are.
-    /// What is written behind them means nothing. Bit `x` of `corners[k]` is corner `k` of cell `x`.
+    /// Writes the case of each cell whose bit is set in `active` to `cases`, lowest first, and returns their number.
+    /// Items behind them may be overwritten. Bit `x` of `corners[k]` is corner `k` of cell `x`.
     fn cases(corners: [u64; 8], active: u64, cases: &mut [u16; 64]) -> usize;
 
-    /// The cases of 64 cells: bit `x` of `corners[k]` is corner `k` of cell `x`.
+    /// The cases of 64 cells. Bit `x` of `corners[k]` is corner `k` of cell `x`.
     ///
-    /// A transposition: 8 × 64 bits become 64 × 8, first within each byte of all eight words at once, then byte by byte.
-    /// At each step, blocks on one side of the diagonal change places with those on the other.
+    /// This is a transposition: 8 × 64 bits become 64 × 8, first within each byte of all eight words at once, then byte
+    /// by byte. Each step swaps blocks on one side of the diagonal with those on the other.
     #[inline(always)]
     fn case_bytes(corners: [u64; 8]) -> [u8; 64] {
         // Written out, so that everything stays in registers.
@@ -175,9 +176,9 @@ pub(crate) trait Simd {
         bytes
     }
 
-    /// The products of the weights at opposite corners of a cell's faces: a bit for each face of which the product of the
-    /// first and third corner is the larger one, and of which that of the second and fourth is. Neither where the larger
-    /// one is infinite or one of them is NaN.
+    /// The faces of a cell on which the product of the first and third corners' weights is larger than that of the
+    /// second's and fourth's, and the faces on which it is smaller, a bit each. A face is in neither set if the larger
+    /// product is infinite or one of them is NaN.
     #[inline(always)]
     fn larger_products(weights: &[f64; 8]) -> [u8; 2] {
         let (mut first_larger, mut second_larger, mut face) = (0, 0, 0);
@@ -192,11 +193,11 @@ pub(crate) trait Simd {
         [first_larger, second_larger]
     }
 
-    /// Writes the triangles of cells, one after the other: for each of `codes`, 16 indices made from the running
-    /// `counters` by the entry of `recipes`, of which the next cell overwrites those that are too many. Returns how
-    /// many indices count: that many have been written.
+    /// Writes the triangles of cells, cell after cell. For each code its recipe makes 16 indices from the running
+    /// `counters`; the next cell overwrites those behind [`Recipe::count`]. Returns the number of indices that are
+    /// valid; all of them have been written.
     ///
-    /// `indices` holds 16 for each code at least.
+    /// `indices` has at least 16 items per code.
     fn triangles(
         recipes: &[Recipe; CODES],
         codes: &[u16],
@@ -219,7 +220,7 @@ pub(crate) fn below<S: Simd, W: Weight>(weights: &[W; 32], threshold: W::Thresho
     W::call::<Below<S>>((weights, threshold))
 }
 
-/// [`below`], by type of weights.
+/// [`below`], by type of weight.
 struct Below<S>(PhantomData<S>);
 
 impl<S: Simd> PerWeight for Below<S> {
@@ -242,8 +243,8 @@ impl<S: Simd> PerWeight for Below<S> {
     }
 }
 
-/// Exchanges the high part of each word with the low part of the word `APART` behind it: what `low` selects there, and
-/// `SHIFT` further up here.
+/// Swaps the high part of each word with the low part of the word `APART` behind it. `low` selects the low part; the
+/// high part lies `SHIFT` bits above.
 #[inline(always)]
 fn swap_blocks<const APART: usize, const SHIFT: u32>(words: [u64; 8], low: u64) -> [u64; 8] {
     core::array::from_fn(|index| {
@@ -253,8 +254,8 @@ fn swap_blocks<const APART: usize, const SHIFT: u32>(words: [u64; 8], low: u64) 
     })
 }
 
-/// Eight words that are treated at once, in lanes 0–7. For loops that keep them from one step to the next: those are not
-/// vectorised by the compiler.
+/// Eight words that are processed at once, in lanes 0–7. They are for loops that carry words from one step to the next:
+/// the compiler does not vectorise those.
 pub(crate) trait Eight: Copy {
     fn load(words: &[u64; 8]) -> Self;
     fn store(self, words: &mut [u64; 8]);
@@ -262,17 +263,17 @@ pub(crate) trait Eight: Copy {
     fn or(self, other: Self) -> Self;
     fn xor(self, other: Self) -> Self;
 
-    /// The lanes `START` to `START + 7` of two times eight. `START`: 1, 2, 4, 6 or 7.
+    /// The lanes `START` to `START + 7` of the sixteen lanes of both. `START`: 1, 2, 4, 6 or 7.
     fn window<const START: usize>(first: Self, second: Self) -> Self;
 
-    /// The union of each bit with those beside it in `sides`, at one less of its number where `from_low` is set, and at one more
-    /// where `from_high` is; words are one row, the lowest bits of lane 0 first. What the lowest bit of lane 0 and the
-    /// highest of lane 7 get means nothing.
+    /// The union of each bit with its neighbours in `sides`: with the one below where `from_low` is set, and with the
+    /// one above where `from_high` is set. The lanes are one row of bits, the lowest bit of lane 0 first. The results
+    /// in the row's first and last bit have no meaning.
     fn spread(self, sides: Self, from_low: Self, from_high: Self) -> Self;
 }
 
-/// The first, second, third and fourth corner of each face, around it. In the places of a seventh and eighth face, the
-/// products are equal.
+/// The first, second, third and fourth corner of each face, in order around it. The two faces that fill up the eight
+/// lanes have equal products.
 const FACE_CORNERS: [[u64; 8]; 4] = {
     let (mut corners, mut face) = ([[0; 8]; 4], 0);
     while face < 6 {
@@ -286,18 +287,18 @@ const FACE_CORNERS: [[u64; 8]; 4] = {
     corners
 };
 
-/// Codes of cells; a power of two, so that a masked code needs no check.
+/// The number of codes of cells. It is a power of two, so that a masked code needs no bounds check.
 pub(crate) const CODES: usize = 1024;
 
-/// What a cell of some code adds to the mesh, in half a cache line. `mesher/primal/triangles.rs` derives them.
+/// The triangles that a code adds to the mesh, in half a cache line. `mesher/primal/triangles.rs` derives the recipes.
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
 pub(crate) struct Recipe {
-    /// For each of up to 15 indices: bits 0–2 name the counter, bit 3 is set where the vertex lies on the high side of
-    /// the cell, bit 4 where it is the one behind the counter's.
+    /// The source of each of up to 15 indices: bits 0–2 name the counter, bit 3 is set if the vertex lies on the high
+    /// side of the cell, bit 4 if it is the one behind the counter's.
     pub vertices: [u8; 16],
-    /// How far the cell advances each counter: 0 or 1.
+    /// The steps that the cell advances each counter by: 0 or 1.
     pub steps: [u8; 8],
-    /// Indices, 0–15.
+    /// The number of indices, 0–15.
     pub count: u8,
 }

@@ -11,7 +11,8 @@ pub(crate) fn crossing_fraction<W: Weight>(a: W, b: W, isovalue: f32) -> f32 {
     clamped(W::fraction(a, b, isovalue))
 }
 
-/// The fraction, moved away from the ends of the edge. NaN becomes the margin: both ends are then the same limit of `f32`.
+/// The fraction, moved away from the ends of the edge. NaN becomes the margin: both ends are then the same limit of
+/// `f32`.
 #[inline(always)]
 pub(crate) fn clamped(fraction: f32) -> f32 {
     // NaN fails the first comparison.

@@ -7,34 +7,34 @@ use crate::{
     signs::SlabLayout,
 };
 
-/// Why meshing stopped.
+/// The reason why meshing stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeshError {
     /// The isovalue is NaN or infinite.
     #[error("the isovalue must be finite, but it is {found}")]
     Isovalue {
-        /// What was given.
+        /// The isovalue that was given.
         found: f32,
     },
-    /// Some axis has no cell.
+    /// An axis has no cell.
     #[error("meshing needs at least {least} samples per axis, but there are {shape}")]
     TooSmall {
-        /// What was given.
+        /// The shape that was given.
         shape: Shape,
-        /// 2, or 4 where the outermost layer is padding.
+        /// The samples per axis that one cell needs: 2, or 4 if the outermost layer is padding.
         least: u32,
     },
     /// Slabs have no cells, or do not fit in memory.
     #[error("slabs need at least 2 samples along x and y and must fit in memory, but they are {} × {}", size[0], size[1])]
     SlabSize {
-        /// What was given: samples along x and y.
+        /// The samples along x and y that were given.
         size: [u32; 2],
     },
-    /// A slab is not as large as was said.
+    /// A slab does not have the size that the mesher was made for.
     #[error("a slab of {} × {} samples needs {expected} weights, but there are {found}", size[0], size[1])]
     SlabLength {
-        /// Samples along x and y.
+        /// The samples along x and y.
         size: [u32; 2],
         /// Their product.
         expected: usize,
@@ -44,13 +44,13 @@ pub enum MeshError {
     /// There are no cells between the slabs.
     #[error("meshing needs at least 2 slabs, but there are {found}")]
     TooFewSlabs {
-        /// How many came.
+        /// The number of slabs that were pushed.
         found: usize,
     },
-    /// The vertices would not fit `u32` indices.
+    /// `u32` indices cannot number all vertices.
     #[error("the surface has at least {found} vertices, more than 32-bit indices can name")]
     TooManyVertices {
-        /// How many there were when meshing stopped.
+        /// The number of vertices when meshing stopped.
         found: u64,
     },
 }

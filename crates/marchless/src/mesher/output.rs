@@ -27,8 +27,8 @@ pub(super) unsafe fn commit<T>(items: &mut Vec<T>, count: usize) {
 
 /// The bounds of the vertices made so far, as the bits of their coordinates.
 ///
-/// Coordinates are never negative, so their bits are in the same order. Vector instructions compare integers in one step,
-/// since integers have no NaN.
+/// Coordinates are never negative, so their bits are in the same order. Vector instructions compare integers in one
+/// step, since integers have no NaN.
 #[derive(Clone, Copy)]
 pub(super) struct VertexBounds {
     pub(super) min: [u32; 3],

@@ -113,8 +113,8 @@ impl SlabPipeline {
         }
     }
 
-    /// Makes the vertices on edges along x and y, unless the next part makes them. Returns the number of the first one of
-    /// each axis.
+    /// Makes the vertices on edges along x and y, unless the next part makes them. Returns the number of the first one
+    /// of each axis.
     #[inline(always)]
     fn mesh_within<S: Simd, W: Weight>(
         &mut self,

@@ -2,35 +2,38 @@
 
 use super::error::MeshError;
 
-/// How to mesh.
+/// The settings of a mesh: isovalue, normals, topology.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshSettings {
-    /// The surface lies where the weight equals this many voxels; samples below it are inside. Finite; default 0.
+    /// The weight of the surface, in voxels. Samples below it are inside. Finite; default 0.
     ///
-    /// Chunks that a [`Source`](crate::Source)'s bound spared from sampling hold no true distances: they suit isovalues
-    /// within ±3 voxels.
+    /// A chunk that a [`Source`](crate::Source)'s bound settled without sampling holds no true distances. It suits
+    /// isovalues within ±3 voxels.
     pub isovalue: f32,
-    /// Whether to compute normals; default true.
+    /// Whether meshes get normals; default true.
     pub normals: bool,
-    /// Which way the surface goes where the signs of a cell's corners leave it open; default [`Topology::Separated`].
+    /// The rule that decides ambiguous cells; default [`Topology::Separated`].
     pub topology: Topology,
 }
 
-/// Which way the surface goes where the signs of a cell's corners leave it open: on faces whose corners alternate, and
-/// between two corners at the ends of a cell's diagonal that are unlike all others.
+/// The rule that decides ambiguous cells, where the signs of the corners allow several surfaces.
 ///
-/// Both give closed, 2-manifold surfaces without zero-area triangles on every input, and the same vertices on the lattice's
-/// edges. A plugin's terrain, its ray casts ([`ray_cast`](crate::ray_cast)) and levels of detail use the default.
+/// A cell is ambiguous if it has a face whose corners alternate, or if two corners at the ends of a diagonal differ
+/// from all others. Both topologies give closed, 2-manifold surfaces without zero-area triangles on every input, and
+/// the same vertices on the lattice's edges. A plugin's terrain, its ray casts ([`ray_cast`](crate::ray_cast)) and
+/// levels of detail use the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Topology {
-    /// Inside corners that stand diagonally on a face or in a cell are separated; the rule of the cases
-    /// ([`cases`](crate::cases)), and the fastest.
+    /// Separates inside corners that are diagonal to each other on a face or in a cell. This is the rule of the
+    /// [`cases`](crate::cases), and the faster option.
     #[default]
     Separated,
-    /// As the trilinear interpolant of the cell's corners has it, computed in `f64`. The few cells that need it (none to
-    /// 3 % of those that the surface crosses in terrain and caves, half of them in white noise) get other triangles, and
-    /// some of them one or six vertices in their interior. Ties and weights that are not finite are decided as by
-    /// default, and tunnels with a waist within 2⁻⁴⁰ of a face of their cell are left out.
+    /// Follows the trilinear interpolant of the cell's corners, computed in `f64`.
+    ///
+    /// Ambiguous cells may get other triangles, and some of them one or six vertices in their interior. Of the cells
+    /// that the surface crosses, none to 3 % are ambiguous in terrain and caves, and half in white noise. Ties and
+    /// weights that are not finite are decided as by default, and tunnels with a waist within 2⁻⁴⁰ of a face of their
+    /// cell are left out.
     Trilinear,
 }
 

@@ -1,4 +1,4 @@
-//! [`SlabMesher`]: volumes that come slab by slab, and need not fit in memory.
+//! [`SlabMesher`]: meshes volumes that come slab by slab and need not fit in memory.
 
 use alloc::vec::Vec;
 
@@ -15,22 +15,22 @@ use crate::{
     simd::Backend,
 };
 
-/// Meshes a volume that is fed slab by slab, along z; holds four slabs of it.
+/// Meshes a volume that comes slab by slab along z, and keeps four slabs of it.
 ///
-/// Joined, all that it makes is what [`Mesher::mesh`](super::Mesher::mesh) makes of the whole volume at once, byte for
-/// byte; the same promises hold. Slabs have no materials.
+/// Its output, joined, is the mesh that [`Mesher::mesh`](super::Mesher::mesh) makes of the whole volume, byte for byte,
+/// with the same guarantees. Slabs have no materials.
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshSettings, SlabMesher};
 ///
-/// // A slope, 16 samples high, of which only one slab is ever there.
+/// // A slope, 16 samples high. Only one slab of it exists at a time.
 /// let mut mesher = SlabMesher::new([32, 32], MeshSettings::default())?;
 /// let mut mesh = MeshBuffer::new();
 /// let mut triangles = 0;
 /// for z in 0..16 {
 ///     let slab: Vec<f32> = (0..32 * 32).map(|index| z as f32 - (index % 32) as f32 / 3.0).collect();
 ///     mesher.push(&slab, &mut mesh)?;
-///     // The mesh could be written to a file here: vertices may go, indices go on counting.
+///     // Write the mesh to a file here. Indices go on counting after the mesh is cleared.
 ///     triangles += mesh.triangle_count();
 ///     mesh.clear();
 /// }
@@ -48,17 +48,17 @@ pub struct SlabMesher<W> {
     pipeline: SlabPipeline,
     /// The newest slabs: slab `z` at `z % 4`.
     newest: [Vec<W>; 4],
-    /// Slabs that have come.
+    /// The number of slabs that were pushed.
     count: usize,
 }
 
 impl<W: Weight> SlabMesher<W> {
-    /// A mesher of slabs of `size` samples along x and y, at least 2 each. All their cells are meshed; at the
-    /// volume's border the gradient is one-sided.
+    /// A mesher for slabs of `size` samples along x and y, at least 2 each. It meshes all cells; at the volume's border
+    /// the gradient is one-sided.
     ///
     /// # Errors
-    /// [`MeshError::SlabSize`] where an axis has fewer than 2 samples or a slab does not fit in memory;
-    /// [`MeshError::Isovalue`] where the isovalue is not finite.
+    /// [`MeshError::SlabSize`] if an axis has fewer than 2 samples or a slab does not fit in memory;
+    /// [`MeshError::Isovalue`] if the isovalue is not finite.
     pub fn new(size: [u32; 2], settings: MeshSettings) -> Result<Self, MeshError> {
         settings.check()?;
         let layout = SlabLayout::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
@@ -66,14 +66,14 @@ impl<W: Weight> SlabMesher<W> {
         Ok(Self { backend, settings, size, layout, pipeline, newest: Default::default(), count: 0 })
     }
 
-    /// Takes in the next slab and appends to `out` what it completes. `slab`: `[nx·ny]`, x fastest.
+    /// Reads the next slab and appends the vertices and triangles that it completes to `out`. `slab`: `[nx·ny]`, x
+    /// fastest.
     ///
-    /// Vertices, indices and bounds may be taken out of `out` between calls: indices go on counting all vertices since
-    /// the first slab.
+    /// `out` may be emptied between calls: indices count all vertices since the first slab.
     ///
     /// # Errors
-    /// [`MeshError::SlabLength`], and nothing has changed. [`MeshError::TooManyVertices`], and so with every further
-    /// call; `out` then ends with vertices of no triangle.
+    /// [`MeshError::SlabLength`]; nothing has then changed. [`MeshError::TooManyVertices`], then from every further
+    /// call too; `out` then ends with vertices of no triangle.
     pub fn push(&mut self, slab: &[W], out: &mut MeshBuffer) -> Result<(), MeshError> {
         if slab.len() != self.layout.len {
             let (size, expected) = (self.size, self.layout.len);
@@ -86,7 +86,7 @@ impl<W: Weight> SlabMesher<W> {
         self.push_with(fill, out)
     }
 
-    /// The same of the slab that `fill` makes of an older one, or of an empty vector.
+    /// [`SlabMesher::push`] for a slab that `fill` writes to a vector, which holds an older slab or nothing.
     pub(crate) fn push_with(&mut self, fill: impl FnOnce(&mut Vec<W>), out: &mut MeshBuffer) -> Result<(), MeshError> {
         let newest = &mut self.newest[self.count % 4];
         fill(newest);
@@ -96,15 +96,15 @@ impl<W: Weight> SlabMesher<W> {
         if self.count >= 2 { self.step(self.count - 2, out) } else { Ok(()) }
     }
 
-    /// Appends to `out` what is left to be made once the last slab is in.
+    /// Appends the rest of the mesh to `out`, after the last slab.
     ///
     /// # Errors
-    /// [`MeshError::TooFewSlabs`] where fewer than 2 slabs have come; [`MeshError::TooManyVertices`].
+    /// [`MeshError::TooFewSlabs`] if fewer than 2 slabs were pushed; [`MeshError::TooManyVertices`].
     pub fn finish(mut self, out: &mut MeshBuffer) -> Result<(), MeshError> {
         self.end(out)
     }
 
-    /// The same for a mesher that will [start over](Self::start_over).
+    /// [`SlabMesher::finish`] for a mesher that will [start over](Self::start_over).
     pub(crate) fn end(&mut self, out: &mut MeshBuffer) -> Result<(), MeshError> {
         if self.count < 2 {
             return Err(MeshError::TooFewSlabs { found: self.count });
@@ -112,10 +112,10 @@ impl<W: Weight> SlabMesher<W> {
         self.step(self.count - 1, out)
     }
 
-    /// Begins another volume, and keeps the memory.
+    /// Begins another volume and keeps the memory.
     ///
     /// # Errors
-    /// As [`SlabMesher::new`].
+    /// [`MeshError::SlabSize`], as from [`SlabMesher::new`].
     pub(crate) fn start_over(&mut self, size: [u32; 2]) -> Result<(), MeshError> {
         self.layout = SlabLayout::of_slabs(size).ok_or(MeshError::SlabSize { size })?;
         (self.size, self.count) = (size, 0);

@@ -1,4 +1,4 @@
-//! [`ThreadedMesher`]: one large volume on several threads.
+//! [`ThreadedMesher`]: meshes one large volume on several threads.
 
 use alloc::vec::Vec;
 use core::{mem::MaybeUninit, num::NonZero};
@@ -17,15 +17,15 @@ use super::{
 };
 use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
 
-/// Parts of a volume for each thread: enough that the threads finish at about the same time where the surface lies in a
-/// few slabs.
+/// The parts of a volume per thread. There are enough that all threads finish at about the same time even if the
+/// surface lies in a few slabs.
 const PARTS: usize = 8;
 
-/// Meshes one large volume on several threads; keeps its scratch memory between volumes.
+/// Meshes one large volume on several threads. It keeps its scratch memory from volume to volume.
 ///
-/// The mesh is that of [`Mesher::mesh`](super::Mesher::mesh), byte for byte, on any number of threads; the same promises
-/// hold. The threads make parts of the mesh in memory of their own, which takes as much again as the mesh, and join
-/// them. For many small volumes, such as chunks, give each thread a `Mesher` of its own instead.
+/// The mesh is that of [`Mesher::mesh`](super::Mesher::mesh), byte for byte, on any number of threads, with the same
+/// guarantees. The threads first make parts of the mesh in scratch memory, which takes as much memory as the mesh, and
+/// then join them. For many small volumes, such as chunks, give each thread its own `Mesher` instead.
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshSettings, Samples, Shape, ThreadedMesher};
@@ -47,15 +47,16 @@ pub struct ThreadedMesher {
 }
 
 impl ThreadedMesher {
-    /// A mesher that has allocated nothing yet and will use `threads` threads, the caller's among them.
+    /// A mesher that uses `threads` threads, including the caller's. It allocates nothing until the first mesh.
     pub fn new(threads: NonZero<usize>) -> Self {
         Self { threads, backend: Backend::fastest(), parts: Vec::new(), pipelines: Vec::new() }
     }
 
-    /// Meshes `samples` into `out`, whose former content is dropped. No surface is no error: `out` is then empty.
+    /// Meshes `samples` into `out` and drops its former content. Samples without a surface are no error: `out` is then
+    /// empty.
     ///
     /// # Errors
-    /// As [`Mesher::mesh`](super::Mesher::mesh); `out` is then empty.
+    /// Those of [`Mesher::mesh`](super::Mesher::mesh). `out` is then empty.
     pub fn mesh<W: Weight>(
         &mut self,
         samples: Samples<'_, W>,
@@ -88,13 +89,14 @@ impl ThreadedMesher {
     }
 }
 
-/// What comes next in a queue that several threads share.
+/// Takes the next item from a queue that several threads share.
 fn next<I: Iterator>(queue: &Mutex<I>) -> Option<I::Item> {
     queue.lock().unwrap_or_else(PoisonError::into_inner).next()
 }
 
-/// Runs all of `jobs` at once, the first of them on this thread, and returns an error where there is one. Where the
-/// system has no more threads to give, fewer jobs run: each must be able to do the work of all.
+/// Runs all `jobs` at once, the first on this thread, and returns an error if any job fails.
+///
+/// If the system refuses to start a thread, fewer jobs run. So each job must be able to do the work of all.
 fn on_threads<J: FnOnce() -> Result<(), MeshError> + Send>(mut jobs: impl Iterator<Item = J>) -> Result<(), MeshError> {
     let Some(own) = jobs.next() else { return Ok(()) };
     thread::scope(|scope| {
@@ -109,10 +111,10 @@ fn on_threads<J: FnOnce() -> Result<(), MeshError> + Send>(mut jobs: impl Iterat
     })
 }
 
-/// A part of the mesh and the places in the whole that it goes to.
+/// A part of the mesh, and the slices of the whole mesh that it is copied to.
 struct Piece<'a> {
     part: &'a MeshBuffer,
-    /// Vertices of the parts before.
+    /// The number of vertices in all earlier parts.
     base: u32,
     positions: &'a mut [MaybeUninit<[f32; 3]>],
     normals: &'a mut [MaybeUninit<[f32; 3]>],
@@ -120,9 +122,10 @@ struct Piece<'a> {
     indices: &'a mut [MaybeUninit<u32>],
 }
 
-/// Writes `parts` to `out`, which is empty, one behind the other.
+/// Appends `parts` to `out`, which is empty.
 ///
-/// Indices that count the vertices of a part run on into the next part's at its end: those come right behind.
+/// At the end of a part, indices go beyond the part's own vertices. They then name vertices of the next part, which
+/// follow directly in the whole mesh.
 fn concatenate(parts: &[MeshBuffer], threads: usize, out: &mut MeshBuffer) -> Result<(), MeshError> {
     let sum = |len: fn(&MeshBuffer) -> usize| parts.iter().map(len).sum::<usize>();
     let lens = [sum(|part| part.positions.len()), sum(|part| part.normals.len()), sum(|part| part.materials.len())];
@@ -159,7 +162,7 @@ fn concatenate(parts: &[MeshBuffer], threads: usize, out: &mut MeshBuffer) -> Re
         Ok(())
     };
     on_threads((0..threads).map(|_| work))?;
-    // SAFETY: the pieces fill the room without a gap, and all of them have been written.
+    // SAFETY: the pieces fill the reserved memory without a gap, and all of them have been written.
     #[expect(unsafe_code, reason = "spares filling the vectors with zeros first")]
     unsafe {
         commit(&mut out.positions, lens[0]);

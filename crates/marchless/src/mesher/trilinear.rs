@@ -6,9 +6,9 @@
 //!
 //! The faces settle most of them (the asymptotic decider): on an ambiguous face, the product of the weights at the ends
 //! of each diagonal tells which two corners are joined, and both cells at the face compute the same products. A table
-//! then has the code of the triangles, as for any other case. What is left are special cells: cells with a loop that has
-//! no fan, cells of more than five triangles, and cells whose sheets a tunnel joins. They are meshed one by one, most of
-//! them with vertices in their interior.
+//! then has the code of the triangles, as for any other case. What is left are special cells: cells with a loop that
+//! has no fan, cells of more than five triangles, and cells whose sheets a tunnel joins. They are meshed one by one,
+//! most of them with vertices in their interior.
 //!
 //! In a face's products, ties and weights that are not finite leave the inside separated, as with
 //! [`Topology::Separated`].
@@ -132,7 +132,8 @@ impl TrilinearCells {
         bounds: &mut VertexBounds,
         out: &mut MeshBuffer,
     ) -> u64 {
-        // Without a branch, since no predictor knows how a cell is decided. Cells that need more work move to the front.
+        // Without a branch, since no predictor knows how a cell is decided. Cells that need more work move to the
+        // front.
         let corners = CornerSamples::new(layout, edges, settings);
         let cells = &mut self.ambiguous.0;
         let mut kept = 0;

@@ -1,4 +1,4 @@
-//! AVX2: signs 32 at a time, cases 32 at a time by comparing broadcast bits, indices eight at a time by a permutation.
+//! AVX2: 32 signs at a time, 32 cases at a time by comparing broadcast bits, eight indices at a time by a permutation.
 #![expect(
     unsafe_code,
     reason = "the instructions exist only where the processor has them; loads and stores take raw pointers"
@@ -19,10 +19,10 @@ pub(super) unsafe fn run<J: Job>(job: J) -> J::Output {
     job.run::<Avx2>()
 }
 
-/// Used within [`run`] alone, so that the instructions are there.
+/// The AVX2 backend. Only [`run`] uses it, so the instructions are available.
 pub(super) struct Avx2;
 
-/// Lanes 0–3 and 4–7. Used within [`run`] alone.
+/// Lanes 0–3 and 4–7. Only code within [`run`] uses them.
 #[derive(Clone, Copy)]
 pub(super) struct Words([__m256i; 2]);
 
@@ -85,7 +85,8 @@ impl Eight for Words {
     }
 }
 
-/// [`Eight::spread`] for half of the lanes, of the sides in the lanes before them, in them and behind them.
+/// [`Eight::spread`] for half of the lanes. The array holds the sides in the lanes before these, in these and behind
+/// these.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn spread(centre: __m256i, [below, here, above]: [__m256i; 3], from_low: __m256i, from_high: __m256i) -> __m256i {
@@ -95,14 +96,14 @@ fn spread(centre: __m256i, [below, here, above]: [__m256i; 3], from_low: __m256i
     _mm256_or_si256(_mm256_or_si256(low, high), centre)
 }
 
-/// The lanes 1–4 of two times four.
+/// The lanes 1–4 of the eight lanes of both.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn one_on(first: __m256i, second: __m256i) -> __m256i {
     _mm256_permute4x64_epi64::<0b00_11_10_01>(_mm256_blend_epi32::<0b11>(first, second))
 }
 
-/// The lanes 3–6 of two times four.
+/// The lanes 3–6 of the eight lanes of both.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn three_on(first: __m256i, second: __m256i) -> __m256i {
@@ -183,7 +184,7 @@ fn below_i16(weights: &[i16; 32], threshold: i16) -> u32 {
         // SAFETY: the load is all of the 16 weights.
         _mm256_cmpgt_epi16(threshold, unsafe { _mm256_loadu_si256(half.as_ptr().cast()) })
     };
-    // Packing goes by halves of 128 bits; the permutation puts them back in order.
+    // Packing works on halves of 128 bits; the permutation restores the order.
     let packed = _mm256_packs_epi16(below(&weights[..16]), below(&weights[16..]));
     _mm256_movemask_epi8(_mm256_permute4x64_epi64::<0b11_01_10_00>(packed)) as u32
 }
@@ -221,7 +222,7 @@ fn nonzero(words: &[u64]) -> u64 {
 fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
     let count = active.count_ones() as usize;
     let mut dense = [0u8; 64];
-    // Each byte of a half gets the byte that its bit lies in, and keeps the bit.
+    // Each byte of a half gets the byte that holds its bit, and keeps only the bit.
     let [a, b, c, d] = [0, 1, 2, 3].map(|byte| byte * 0x0101_0101_0101_0101);
     let (spread, bit) = (_mm256_setr_epi64x(a, b, c, d), _mm256_set1_epi64x(0x8040_2010_0804_0201u64 as i64));
     for (half, dense) in dense.as_chunks_mut::<32>().0.iter_mut().enumerate() {
@@ -247,9 +248,10 @@ fn cases(corners: [u64; 8], mut active: u64, cases: &mut [u16; 64]) -> usize {
     count
 }
 
-/// As the plain version, but byte by byte first, so that each word then holds the corners of eight cells.
+/// The cases of 64 cells, as in the plain version but byte by byte first: each word then holds the corners of eight
+/// cells.
 ///
-/// Eight arguments, since of an array the compiler makes vector loads before it sees that the array is still in registers.
+/// It takes eight arguments because the compiler would load an array from memory, although its words are in registers.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn case_bytes(a: u64, b: u64, c: u64, d: u64, e: u64, f: u64, g: u64, h: u64) -> [u8; 64] {
@@ -262,7 +264,7 @@ fn case_bytes(a: u64, b: u64, c: u64, d: u64, e: u64, f: u64, g: u64, h: u64) ->
     let mut dense = [0; 64];
     for (half, dense) in halves.into_iter().zip(dense.as_chunks_mut::<32>().0) {
         let mut words = half;
-        // Blocks of one, two and four bits change places across the diagonal.
+        // Swap blocks of one, two and four bits across the diagonal.
         macro_rules! swap_blocks {
             ($shift:literal, $low:literal) => {
                 let there = _mm256_srli_epi64::<$shift>(words);
@@ -294,11 +296,11 @@ fn triangles(
     for &code in codes {
         let recipe = &recipes[usize::from(code) % CODES];
         for half in [0, 8] {
-            // SAFETY: the load is half of the vertices. `end` grows by 15 a code at most, so that the 16 indices from
-            // it on lie within what was asserted.
+            // SAFETY: the load is half of the vertices. `end` grows by at most 15 per code, so the 16 indices from it
+            // on lie within the asserted length.
             unsafe {
                 let vertices = _mm256_cvtepu8_epi32(_mm_loadl_epi64(recipe.vertices.as_ptr().add(half).cast()));
-                // The permutation looks at bits 0 to 2 only.
+                // The permutation uses bits 0 to 2 only.
                 let first = _mm256_permutevar8x32_epi32(running, vertices);
                 let indices_of_half = _mm256_add_epi32(first, _mm256_srli_epi32::<4>(vertices));
                 _mm256_storeu_si256(indices.as_mut_ptr().add(end + half).cast(), indices_of_half);

@@ -19,7 +19,7 @@ pub(super) unsafe fn run<J: Job>(job: J) -> J::Output {
     job.run::<Avx512>()
 }
 
-/// Used within [`run`] alone, so that the instructions are there.
+/// The AVX-512 backend. Only [`run`] uses it, so the instructions are available.
 pub(super) struct Avx512;
 
 impl Simd for Avx512 {
@@ -85,7 +85,7 @@ impl Simd for Avx512 {
     }
 }
 
-/// Used within [`run`] alone.
+/// Lanes 0–7. Only code within [`run`] uses them.
 #[derive(Clone, Copy)]
 pub(super) struct Words(__m512i);
 
@@ -276,13 +276,13 @@ fn triangles(
 ) -> usize {
     assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
     let mut end = 0;
-    // The counters twice, so that bit 3 of a lane's number makes no difference.
+    // Both halves hold the counters, so that bit 3 of a lane's number makes no difference.
     // SAFETY: the load is all of the counters.
     let mut running = _mm512_broadcast_i64x4(unsafe { _mm256_loadu_si256(counters.as_ptr().cast()) });
     for &code in codes {
         let recipe = &recipes[usize::from(code) % CODES];
-        // SAFETY: the loads are all of the vertices and all of the eight steps. `end` grows by 15 a code at most, so
-        // that the 16 indices from it on lie within what was asserted.
+        // SAFETY: the loads are all of the vertices and all of the eight steps. `end` grows by at most 15 per code, so
+        // the 16 indices from it on lie within the asserted length.
         unsafe {
             let vertices = _mm512_cvtepu8_epi32(_mm_loadu_si128(recipe.vertices.as_ptr().cast()));
             let first = _mm512_permutexvar_epi32(vertices, running);

@@ -1,4 +1,4 @@
-//! Words and plain loops: the oracle of the other backends, and what runs where there are none.
+//! Words and plain loops: the oracle of the other backends, and the backend of machines without them.
 
 use core::{array::from_fn, mem::MaybeUninit};
 
@@ -118,8 +118,10 @@ impl Eight for [u64; 8] {
     }
 }
 
-/// Each comparison becomes a byte first, in a loop that the compiler turns into vector compares; one multiplication
-/// then gathers the lowest bits of eight bytes.
+/// The weights below `threshold`, a bit each.
+///
+/// Each comparison first becomes a byte, in a loop that the compiler vectorises. One multiplication then gathers the
+/// lowest bits of eight bytes.
 #[inline(always)]
 fn below<W: Copy + PartialOrd>(weights: &[W; 32], threshold: W) -> u32 {
     let mut bytes = [0u8; 32];

@@ -1,4 +1,4 @@
-//! SSE2: signs sixteen at a time and counters four at a time, the rest as in the portable backend.
+//! SSE2: sixteen signs at a time and four counters at a time; the rest is the portable backend's.
 #![expect(unsafe_code, reason = "vector loads take raw pointers")]
 
 use core::{arch::x86_64::*, mem::MaybeUninit};
@@ -71,13 +71,13 @@ impl Simd for Sse2 {
         assert!(indices.len() >= 16 * codes.len(), "16 indices are written for each code");
         let mut end = 0;
         // SAFETY: SSE2 is available. The loads and stores are halves of the counters, all of the eight steps, and
-        // quarters of `vertices`. The 15 entries of a cell are less than 32. `end` grows by 15 a code at most, so that
-        // the 15 indices from it on lie within what was asserted.
+        // quarters of `vertices`. The 15 entries of a cell are less than 32. `end` grows by at most 15 per code, so the
+        // 15 indices from it on lie within the asserted length.
         unsafe {
             let zero = _mm_setzero_si128();
             let mut x = _mm_loadu_si128(counters.as_ptr().cast());
             let mut low = _mm_loadu_si128(counters.as_ptr().add(4).cast());
-            // By the five bits of an entry: the high side stands where bit 3 is set, whatever bit 4 is.
+            // Indexed by the five bits of an entry: where bit 3 is set, the high side, whatever bit 4 is.
             let mut vertices = [0u32; 32];
             for &code in codes {
                 let recipe = &recipes[usize::from(code) % CODES];

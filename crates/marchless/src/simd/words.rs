@@ -1,4 +1,4 @@
-//! Words in memory that vector instructions take a whole cache line of at a time.
+//! [`Words`]: words aligned to cache lines, for vectors of 64 bytes.
 #![expect(unsafe_code, reason = "a view of whole lines as single words")]
 
 use alloc::{collections::TryReserveError, vec, vec::Vec};
@@ -7,11 +7,10 @@ use core::{
     slice,
 };
 
-/// Words from the start of a cache line on. With vectors of 64 bytes that reach from one line into the next, dilation
-/// takes 1.7 times as long.
+/// Words that start at a cache line. Dilation takes 1.7 times as long if vectors of 64 bytes straddle two lines.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Words {
-    /// What is behind the last word is zero.
+    /// The lines that hold the words. Unused words of the last line are zero.
     lines: Vec<Line>,
     len: usize,
 }
@@ -21,12 +20,15 @@ pub(crate) struct Words {
 struct Line([u64; 8]);
 
 impl Words {
-    /// So many zeros.
+    /// `len` zeros.
     pub(crate) fn zeros(len: usize) -> Self {
         Self { lines: vec![Line([0; 8]); len.div_ceil(8)], len }
     }
 
-    /// So many zeros, where memory holds them.
+    /// `len` zeros.
+    ///
+    /// # Errors
+    /// An error if memory does not suffice.
     pub(crate) fn try_zeros(len: usize) -> Result<Self, TryReserveError> {
         let mut lines = Vec::new();
         lines.try_reserve_exact(len.div_ceil(8))?;
@@ -41,7 +43,7 @@ impl Deref for Words {
     #[inline]
     fn deref(&self) -> &[u64] {
         debug_assert!(self.len <= 8 * self.lines.len());
-        // SAFETY: lines are eight words each, without anything in between, and there are enough of them.
+        // SAFETY: each line is eight words without padding, and there are enough lines.
         unsafe { slice::from_raw_parts(self.lines.as_ptr().cast(), self.len) }
     }
 }
@@ -50,7 +52,7 @@ impl DerefMut for Words {
     #[inline]
     fn deref_mut(&mut self) -> &mut [u64] {
         debug_assert!(self.len <= 8 * self.lines.len());
-        // SAFETY: as above, and they are borrowed for as long.
+        // SAFETY: as above; the words borrow the lines exclusively.
         unsafe { slice::from_raw_parts_mut(self.lines.as_mut_ptr().cast(), self.len) }
     }
 }

@@ -44,8 +44,8 @@ pub(in crate::mesher) struct VertexPass<W: Weight> {
     /// The lattice positions of the edges' low ends.
     x: [u32; BATCH_CAPACITY],
     y: [u32; BATCH_CAPACITY],
-    /// The four samples around the low and around the high end along x: one below the end, the end, and two above. On an
-    /// edge along x, the low end's hold the high end.
+    /// The four samples around the low and around the high end along x: one below the end, the end, and two above. On
+    /// an edge along x, the low end's hold the high end.
     rows: [([W::Left; BATCH_CAPACITY], [W::Right; BATCH_CAPACITY]); 2],
     /// On an edge along x: both ends' neighbours below along y, above along y, below along z, and above along z.
     pairs: [[W::Pair; BATCH_CAPACITY]; 4],
@@ -68,8 +68,8 @@ impl<W: Weight> VertexPass<W> {
         }
     }
 
-    /// Appends the vertices on all edges along `AXIS`, row by row, and returns their number. `low` and `high`: the signs
-    /// of the edges' ends.
+    /// Appends the vertices on all edges along `AXIS`, row by row, and returns their number. `low` and `high`: the
+    /// signs of the edges' ends.
     #[inline(always)]
     pub(in crate::mesher) fn add<S: Simd, const AXIS: usize>(
         &mut self,

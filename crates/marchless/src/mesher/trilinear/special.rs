@@ -76,7 +76,7 @@ impl<W: Weight> SpecialMesher<'_, W> {
         1
     }
 
-    /// Appends a vertex to the mesh. `at`: in the cell.
+    /// Appends the vertex at the point `at` of the cell.
     fn vertex(&self, interpolant: &Interpolant, at: [f64; 3], bounds: &mut VertexBounds, out: &mut MeshBuffer) {
         let origin = [f64::from(self.x), f64::from(self.y), self.edges.z as f64];
         let position = core::array::from_fn(|axis| (origin[axis] + at[axis]) as f32);
@@ -98,17 +98,17 @@ impl<W: Weight> SpecialMesher<'_, W> {
     }
 }
 
-/// The trilinear interpolant of a cell's weights, all of them finite.
+/// The trilinear interpolant of a cell's corner weights, which are finite.
 struct Interpolant([f64; 8]);
 
 impl Interpolant {
     fn new(weights: &[f64; 8]) -> Self {
-        // Twice what `f32` holds: the isovalue has been taken off.
+        // Twice the range of `f32`, because the isovalue has been subtracted.
         let [least, most] = [f32::MIN, f32::MAX].map(|limit| 2.0 * f64::from(limit));
         Self(weights.map(|weight| if weight.is_nan() { most } else { weight.clamp(least, most) }))
     }
 
-    /// Where the interpolant is 0 on an edge, whose ends differ in sign.
+    /// The point on an edge where the interpolant is 0. The signs of the ends differ.
     fn crossing(&self, edge: Edge) -> [f64; 3] {
         let mut crossing = edge.corners()[0].offset().map(f64::from);
         crossing[edge.axis()] = self.crossing_along(edge);
@@ -121,7 +121,7 @@ impl Interpolant {
         a / (a - b)
     }
 
-    /// The value and the gradient at a point.
+    /// The interpolant's value and gradient at a point.
     fn at_with_gradient(&self, [x, y, z]: [f64; 3]) -> (f64, [f64; 3]) {
         let between = |from: f64, to: f64, t: f64| from + (to - from) * t;
         let [a, b, c, d, e, f, g, h] = self.0;
@@ -132,7 +132,7 @@ impl Interpolant {
         (between(low, high, z), [along_x, along_y, high - low])
     }
 
-    /// The direction in which the weights grow; up where they do not.
+    /// The unit direction of the gradient at a point; +z if the gradient is zero.
     fn normal(&self, at: [f64; 3]) -> [f32; 3] {
         let (_, gradient) = self.at_with_gradient(at);
         let largest = gradient.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
@@ -144,7 +144,7 @@ impl Interpolant {
         [x, y, z].map(|v| (v / length) as f32)
     }
 
-    /// Moves a point along the gradient, to the surface or near it.
+    /// The point moved along the gradient, to the surface or near it.
     fn nearest_to(&self, mut point: [f64; 3]) -> [f64; 3] {
         for _ in 0..4 {
             let (value, gradient) = self.at_with_gradient(point);
@@ -163,22 +163,23 @@ impl Interpolant {
     }
 }
 
-/// Two loops whose sheets are one, and the ring between them.
+/// A tunnel: two loops that share one sheet, and the ring between them.
 struct Tunnel {
-    /// Where the ring's corners are, in order.
+    /// The ring's corners, in order.
     ring: [[f64; 3]; RING],
-    /// The strips between the loops and the ring, whose corners are the first vertices in the interior.
+    /// The strips between the loops and the ring. The ring's corners are the first vertices in the interior.
     strips: [Strip; 2],
-    /// What the other loops bound.
+    /// The sheets of the other loops.
     others: Sheets,
 }
 
 impl Tunnel {
-    /// `None` where it cannot be told what is to be joined.
+    /// The tunnel with this waist; `None` if it is unclear which loops it joins.
     fn new(case: CaseIndex, joined: u8, interpolant: &Interpolant, waist: Waist) -> Option<Self> {
         let loops = &Loops::new(case, joined);
         let corner = |corner: usize, waist: &Waist| core::array::from_fn(|axis| waist[axis][corner >> axis & 1]);
-        // On the ring the interpolant is about 0. What the tunnel goes around is farthest from that.
+        // The interpolant is about 0 on the ring, and farthest from 0 at the ends of the diagonal that the tunnel
+        // surrounds.
         let value = |end: usize| interpolant.at_with_gradient(corner(end, &waist)).0;
         let (mut end, mut through) = (0, 0.0f64);
         for other in 0..4 {
@@ -220,8 +221,8 @@ impl Tunnel {
     }
 }
 
-/// How points of a straightened cell, joined in order, turn around the cell's diagonal from corner `end`: positive one way,
-/// negative the other.
+/// The turn of a closed line around the diagonal of a straightened cell from corner `end`: positive for one sense of
+/// rotation, negative for the other.
 fn turn(points: &[[f64; 3]], end: usize) -> f64 {
     let diagonal: [f64; 3] = core::array::from_fn(|axis| if end >> axis & 1 == 1 { -1.0 } else { 1.0 });
     let (mut sum, mut last) = (0.0, points[points.len() - 1].map(|v| v - 1.5));
@@ -233,12 +234,12 @@ fn turn(points: &[[f64; 3]], end: usize) -> f64 {
     sum
 }
 
-/// The two loops that a tunnel joins. `goes_around_inside`: what is within the tunnel.
+/// The two loops that a tunnel joins, if that is clear. `goes_around_inside`: true if the tunnel surrounds the inside.
 fn joined_loops(case: CaseIndex, loops: &Loops, goes_around_inside: bool) -> Option<[usize; 2]> {
     if loops.count == 2 {
         return Some([0, 1]);
     }
-    // The tunnel leads to the corner that one of the small sheets cuts off: not to one of the other sign.
+    // The tunnel leads to a corner that a small sheet cuts off, and that has the sign of what the tunnel surrounds.
     let leads_to = |number: &usize| {
         let ends = |edge: &Edge| edge.corners().iter().fold(0, |ends, corner| ends | 1u8 << corner.index());
         let cut_off = loops.get(*number).iter().fold(u8::MAX, |common, edge| common & ends(edge));

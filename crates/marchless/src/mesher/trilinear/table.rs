@@ -1,4 +1,4 @@
-//! What becomes of each case once its faces are decided, derived at compile time.
+//! The outcome of each ambiguous case once its faces are decided, derived at compile time.
 
 use crate::{
     active::FIRST_FREE_CODE,
@@ -6,16 +6,16 @@ use crate::{
     cell::{CaseIndex, Edge, Face},
 };
 
-/// What becomes of a cell.
+/// The outcome of an ambiguous cell: the code of its triangles, or the sheets of a special cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome(u16);
 
 impl Outcome {
-    /// The cell is made one by one.
+    /// Set if the cell is special.
     const SPECIAL: u16 = 1 << 14;
-    /// Sheets of it may be joined by a tunnel.
+    /// Set if a tunnel may join sheets of the cell.
     const TUNNEL: u16 = 1 << 15;
-    /// That of the case without inside corners.
+    /// The outcome of the case without inside corners.
     const NONE: Self = Self(0);
 
     pub(super) const fn is_special(self) -> bool {
@@ -26,7 +26,7 @@ impl Outcome {
         self.0 & Self::TUNNEL != 0
     }
 
-    /// The code of its triangles, where it is neither made nor has a tunnel; that of the case where it is made.
+    /// The code of the cell's triangles if it has no tunnel; the case of a special cell.
     #[inline(always)]
     pub(super) const fn code_or(self, case: CaseIndex) -> u16 {
         if self.is_special() { case.0 as u16 } else { self.number() }
@@ -36,31 +36,31 @@ impl Outcome {
         self.0 & !(Self::SPECIAL | Self::TUNNEL)
     }
 
-    /// Its triangles, where it is made.
+    /// The sheets of a special cell.
     pub(super) fn sheets(self) -> &'static Sheets {
         &SHEETS[usize::from(self.number()) % SHEETS.len()]
     }
 }
 
-/// The triangles of a cell without those of a tunnel: fans around crossings, and one disc around a vertex in the interior
-/// where a loop has no fan.
+/// The triangles of a cell without a tunnel's: fans around crossings, and a disc around a vertex in the interior if a
+/// loop has no fan.
 #[derive(Clone, Copy)]
 pub(super) struct Sheets {
-    /// The first `count` count. Corners are edges, and [`FIRST_INTERIOR`] is the disc's middle.
+    /// The first `count` are in use. Corners are edges, and [`FIRST_INTERIOR`] is the disc's middle.
     triangles: [[u8; 3]; 12],
     count: u8,
-    /// The disc's rim, of which the first `rim_len` count.
+    /// The disc's rim. The first `rim_len` are in use.
     rim: [Edge; 12],
     rim_len: u8,
 }
 
-/// The name of the first vertex in a cell's interior, behind those on its edges.
+/// The number of the first vertex in a cell's interior; those on its edges come before.
 pub(super) const FIRST_INTERIOR: u8 = 12;
 
 impl Sheets {
     const NONE: Self = Self { triangles: [[0; 3]; 12], count: 0, rim: [Edge::ALL[0]; 12], rim_len: 0 };
 
-    /// The sheets of these loops, but for those whose bits are set in `skipped`.
+    /// The sheets of these loops, without the loops whose bits are set in `skipped`.
     pub(super) const fn new(loops: &Loops, skipped: u8) -> Self {
         let (mut sheets, mut number) = (Self::NONE, 0);
         while number < loops.count {
@@ -95,28 +95,28 @@ impl Sheets {
         &self.triangles[..usize::from(self.count)]
     }
 
-    /// The crossings around the vertex in the interior, if there is one.
+    /// The crossings around the vertex in the interior; empty if there is none.
     pub(super) fn rim(&self) -> &[Edge] {
         &self.rim[..usize::from(self.rim_len)]
     }
 }
 
-/// A case with decided faces, whose triangles are not the case's.
+/// A case with decided faces whose triangles differ from the case's.
 #[derive(Clone, Copy)]
 struct DecidedCase {
     case: CaseIndex,
     joined: u8,
 }
 
-/// The codes of such cases follow all others.
+/// The number of codes for decided cases. They start at [`FIRST_FREE_CODE`].
 pub(in crate::mesher) const DECIDED_CODES: usize = TABLE.decided_count;
 
-/// The case of the extra code `number`.
+/// The case of the decided code `number`.
 pub(in crate::mesher) const fn decided_case(number: usize) -> CaseIndex {
     TABLE.decided[number].case
 }
 
-/// The triangles of the extra code `number`: the first so many count.
+/// The triangles of the decided code `number`, and how many of them are in use.
 pub(in crate::mesher) const fn decided_triangles(number: usize) -> (u8, [[Edge; 3]; 5]) {
     let DecidedCase { case, joined } = TABLE.decided[number];
     match triangulate(&Loops::new(case, joined)) {
@@ -125,20 +125,20 @@ pub(in crate::mesher) const fn decided_triangles(number: usize) -> (u8, [[Edge; 
     }
 }
 
-/// A bit for each ambiguous face of a case whose inside corners are joined. `larger`: a bit for each face of which the
-/// first and third corners' weights have the larger product, and of which the second's and fourth's have.
+/// The ambiguous faces of a case whose inside corners are joined, a bit each. `larger`: the faces on which the first
+/// and third corners' weights have the larger product, and those on which the second's and fourth's have, a bit each.
 #[inline(always)]
 pub(super) const fn joined_faces(case: CaseIndex, larger: [u8; 2]) -> u8 {
     let [first_inside, second_inside] = AMBIGUOUS_FACES[case.0 as usize];
     larger[0] & first_inside | larger[1] & second_inside
 }
 
-/// What becomes of a case; `joined`: a bit for each of its ambiguous faces whose inside corners are joined.
+/// The outcome of a case. `joined`: its ambiguous faces whose inside corners are joined, a bit each.
 pub(super) const fn outcome(case: CaseIndex, joined: u8) -> Outcome {
     OUTCOMES[case.0 as usize][joined as usize % 64]
 }
 
-/// The ambiguous faces of a case, a bit each: those whose first corner is inside, and those whose second is.
+/// The ambiguous faces of each case, a bit each: those whose first corner is inside, and those whose second is.
 static AMBIGUOUS_FACES: [[u8; 2]; 256] = {
     let (mut all, mut case) = ([[0; 2]; 256], 0);
     while case < 256 {
@@ -157,12 +157,12 @@ static OUTCOMES: [[Outcome; 64]; 256] = TABLE.outcomes;
 static SHEETS: [Sheets; TABLE.sheets_count] = *TABLE.sheets.split_at(TABLE.sheets_count).0.first_chunk().unwrap();
 
 struct TrilinearTable {
-    /// Of sets of faces that are not all ambiguous, they mean nothing.
+    /// By case and set of joined faces. Sets with a face that is not ambiguous have no meaning.
     outcomes: [[Outcome; 64]; 256],
-    /// The first `extras` count.
+    /// The first `decided_count` are in use.
     decided: [DecidedCase; 256],
     decided_count: usize,
-    /// The first `made` count.
+    /// The first `sheets_count` are in use.
     sheets: [Sheets; 512],
     sheets_count: usize,
 }
@@ -207,8 +207,10 @@ impl TrilinearTable {
     }
 }
 
-/// Whether the trilinear interpolant can join two of these loops by a tunnel: two loops, but of two of three crossings only
-/// those at the ends of a diagonal of the cell, and none of nine; or of three loops the one of six and another.
+/// True if the trilinear interpolant can join two of these loops by a tunnel.
+///
+/// It can join two loops, except if one has nine crossings; two loops of three crossings only if they lie at the ends
+/// of a diagonal of the cell. Of three loops, it can join the one of six crossings and another one.
 const fn may_have_tunnel(case: CaseIndex, loops: &Loops) -> bool {
     let [first_inside, second_inside] = AMBIGUOUS_FACES[case.0 as usize];
     let is_open = first_inside | second_inside != 0;
