@@ -81,70 +81,90 @@ impl Glb {
     fn json(&self) -> Result<Vec<u8>, OutputError> {
         let mut root = json::Root::default();
         let mut node = json::Node::default();
-        if let Some([min, max]) = self.bounds {
-            let (vertices, indices) = (self.vertices * VERTEX, self.triangles * TRIANGLE);
-            let buffer = root.push(json::Buffer {
-                byte_length: USize64(vertices + indices),
-                uri: None,
-                name: None,
-                extensions: None,
-                extras: json::Extras::default(),
-            });
-            let mut view = |start, length, stride, target| {
-                root.push(json::buffer::View {
-                    buffer,
-                    byte_length: USize64(length),
-                    byte_offset: Some(USize64(start)),
-                    byte_stride: stride,
-                    name: None,
-                    target: Some(Valid(target)),
-                    extensions: None,
-                    extras: json::Extras::default(),
-                })
-            };
-            let corners = view(0, vertices, Some(Stride(VERTEX as usize)), Target::ArrayBuffer);
-            let triangles = view(vertices, indices, None, Target::ElementArrayBuffer);
-            let mut accessor = |view, start, count, component, shape, bounds: Option<[[f32; 3]; 2]>| {
-                let [min, max] =
-                    bounds.map_or([None, None], |bounds| bounds.map(|corner| Some(corner.to_vec().into())));
-                root.push(json::Accessor {
-                    buffer_view: Some(view),
-                    byte_offset: Some(USize64(start)),
-                    count: USize64(count),
-                    component_type: Valid(GenericComponentType(component)),
-                    type_: Valid(shape),
-                    min,
-                    max,
-                    name: None,
-                    normalized: false,
-                    sparse: None,
-                    extensions: None,
-                    extras: json::Extras::default(),
-                })
-            };
-            let (float, vector) = (ComponentType::F32, Type::Vec3);
-            let positions = accessor(corners, 0, self.vertices, float, vector, Some([min, max]));
-            let normals = accessor(corners, 12, self.vertices, float, vector, None);
-            let indices = accessor(triangles, 0, 3 * self.triangles, ComponentType::U32, Type::Scalar, None);
-            node.mesh = Some(root.push(json::Mesh {
-                primitives: vec![json::mesh::Primitive {
-                    attributes: [(Valid(Positions), positions), (Valid(Normals), normals)].into(),
-                    indices: Some(indices),
-                    material: None,
-                    mode: Valid(json::mesh::Mode::Triangles),
-                    targets: None,
-                    extensions: None,
-                    extras: json::Extras::default(),
-                }],
-                weights: None,
-                name: None,
-                extensions: None,
-                extras: json::Extras::default(),
-            }));
+        if let Some(bounds) = self.bounds {
+            node.mesh = Some(self.push_mesh(&mut root, bounds));
         }
         let nodes = vec![root.push(node)];
         let scene = json::Scene { nodes, name: None, extensions: None, extras: json::Extras::default() };
         root.scene = Some(root.push(scene));
         json::serialize::to_vec(&root).map_err(|error| OutputError::Io(error.into()))
     }
+
+    /// Adds the mesh with its buffer, whose vertices come before its triangles.
+    fn push_mesh(&self, root: &mut json::Root, bounds: [[f32; 3]; 2]) -> json::Index<json::Mesh> {
+        let [corners, triangles] = self.push_buffer_views(root);
+        let vector = (self.vertices, ComponentType::F32, Type::Vec3);
+        let positions = push_accessor(root, corners, 0, vector, Some(bounds));
+        let normals = push_accessor(root, corners, 12, vector, None);
+        let scalar = (3 * self.triangles, ComponentType::U32, Type::Scalar);
+        let indices = push_accessor(root, triangles, 0, scalar, None);
+        root.push(json::Mesh {
+            primitives: vec![json::mesh::Primitive {
+                attributes: [(Valid(Positions), positions), (Valid(Normals), normals)].into(),
+                indices: Some(indices),
+                material: None,
+                mode: Valid(json::mesh::Mode::Triangles),
+                targets: None,
+                extensions: None,
+                extras: json::Extras::default(),
+            }],
+            weights: None,
+            name: None,
+            extensions: None,
+            extras: json::Extras::default(),
+        })
+    }
+
+    /// Adds the buffer, and its views of the vertices and of the triangles.
+    fn push_buffer_views(&self, root: &mut json::Root) -> [json::Index<json::buffer::View>; 2] {
+        let (vertices, indices) = (self.vertices * VERTEX, self.triangles * TRIANGLE);
+        let buffer = root.push(json::Buffer {
+            byte_length: USize64(vertices + indices),
+            uri: None,
+            name: None,
+            extensions: None,
+            extras: json::Extras::default(),
+        });
+        let mut view = |start, length, stride, target| {
+            root.push(json::buffer::View {
+                buffer,
+                byte_length: USize64(length),
+                byte_offset: Some(USize64(start)),
+                byte_stride: stride,
+                name: None,
+                target: Some(Valid(target)),
+                extensions: None,
+                extras: json::Extras::default(),
+            })
+        };
+        [
+            view(0, vertices, Some(Stride(VERTEX as usize)), Target::ArrayBuffer),
+            view(vertices, indices, None, Target::ElementArrayBuffer),
+        ]
+    }
+}
+
+/// Adds an accessor: `start`, its first byte in the view; how many items it has, and of which type; their bounds.
+fn push_accessor(
+    root: &mut json::Root,
+    view: json::Index<json::buffer::View>,
+    start: u64,
+    (count, component, shape): (u64, ComponentType, Type),
+    bounds: Option<[[f32; 3]; 2]>,
+) -> json::Index<json::Accessor> {
+    let [min, max] = bounds.map_or([None, None], |bounds| bounds.map(|corner| Some(corner.to_vec().into())));
+    root.push(json::Accessor {
+        buffer_view: Some(view),
+        byte_offset: Some(USize64(start)),
+        count: USize64(count),
+        component_type: Valid(GenericComponentType(component)),
+        type_: Valid(shape),
+        min,
+        max,
+        name: None,
+        normalized: false,
+        sparse: None,
+        extensions: None,
+        extras: json::Extras::default(),
+    })
 }
