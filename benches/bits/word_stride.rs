@@ -9,7 +9,7 @@
 //! a bit and write what has changed.
 //!
 //! The article's axes are called z, y and x from the innermost out; ours are x, y and z. With that, its order of corners
-//! (innermost axis first) is [`Corner`](marchless::Corner)'s.
+//! (innermost axis first) is [`Corner`](marchless::cell::Corner)'s.
 
 use marchless::bits::BitGrid;
 

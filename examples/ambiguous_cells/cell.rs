@@ -4,7 +4,8 @@ use core::error::Error;
 use core::ops::RangeInclusive;
 
 use bevy::prelude::Resource;
-use marchless::{CaseIndex, Corner, Face, MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Topology};
+use marchless::cell::{CaseIndex, Corner, Face};
+use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Topology};
 
 use crate::presets::DEFAULT;
 

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};
-use marchless::Corner;
+use marchless::cell::Corner;
 
 use crate::scene::{Cube, corner_place};
 

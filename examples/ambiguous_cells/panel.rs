@@ -5,7 +5,7 @@ use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use bevy::prelude::*;
 use bevy_egui::input::egui_wants_any_keyboard_input;
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};
-use marchless::Corner;
+use marchless::cell::Corner;
 
 use crate::cell::{Cell, RANGE};
 use crate::presets::PRESETS;

@@ -8,7 +8,8 @@ use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll};
 use bevy::mesh::PrimitiveTopology;
 use bevy::prelude::*;
 use bevy_egui::input::egui_wants_any_pointer_input;
-use marchless::{Corner, MeshBuffer};
+use marchless::MeshBuffer;
+use marchless::cell::Corner;
 
 use crate::cell::{Cell, Surface, View, is_interior};
 

@@ -53,7 +53,7 @@ fn free_pieces(
             if island.size() < DUST {
                 continue;
             }
-            println!("A island of {} cubic voxels hangs free.", island.size());
+            println!("An island of {} cubic voxels hangs free.", island.size());
             let body = Body {
                 terrain: edited.terrain,
                 bits: island.bits(),

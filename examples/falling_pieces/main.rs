@@ -69,7 +69,7 @@ fn finish(mut app: App) -> ExitCode {
 }
 
 fn window_app(app: &mut App) {
-    app.add_plugins(window_plugins("Marchless: falling islands")).add_plugins((
+    app.add_plugins(window_plugins("Marchless: falling pieces")).add_plugins((
         EguiPlugin::default(),
         shown_plugin,
         FlyCameraPlugin,

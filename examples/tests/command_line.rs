@@ -283,7 +283,7 @@ fn without_a_display_a_piece_falls_and_comes_to_rest() {
         let (_, rest) = said.lines().find(|said| said.contains(line))?.split_once(before)?;
         rest.split(' ').next()?.parse().ok()
     };
-    let [free, at_rest] = ["hangs free", "is at rest"].map(|line| number(line, "piece of "));
+    let [free, at_rest] = ["hangs free", "is at rest"].map(|line| number(line, "island of "));
     assert!(free.is_some_and(|volume| volume > 5_000) && free == at_rest, "{said}");
     // As far as the gap is high.
     let steps = number("is at rest", "at rest, ");

@@ -116,7 +116,6 @@ pub use brush::{
     BrushError, EDIT_LIMIT, Edit, Operation, QuantisedShape, QuantisedStamp, QuantisedStroke, VolumeByMaterial,
 };
 pub use buffer::MeshBuffer;
-pub use cell::{CaseIndex, Corner, Edge, Face};
 pub use grid::{
     BOUND_BOX_CHUNKS, Block, DEFAULT_CHUNK_CELLS, Grid, GridChunk, GridError, GridSamples, MAX_CHUNK_CELLS,
     MIN_CHUNK_CELLS, Neighbourhood, NeighbourhoodView, SamplePool,

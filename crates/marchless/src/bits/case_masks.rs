@@ -27,7 +27,7 @@ use crate::simd::{Backend, Job, Simd, dispatch};
 
 impl BitGrid {
     /// The case index of every cell, `[(nx − 1)·(ny − 1)·(nz − 1)]`, x fastest: bit k of a cell's byte is its
-    /// [`Corner`](crate::Corner) k, as in [`CaseIndex`](crate::CaseIndex).
+    /// [`Corner`](crate::cell::Corner) k, as in [`CaseIndex`](crate::cell::CaseIndex).
     ///
     /// ```
     /// use marchless::{Shape, bits::BitGrid};
@@ -133,7 +133,8 @@ mod tests {
     use alloc::vec;
 
     use super::*;
-    use crate::{Corner, Shape};
+    use crate::Shape;
+    use crate::cell::Corner;
 
     /// A fair coin for each point.
     fn grid(size: [u32; 3]) -> BitGrid {

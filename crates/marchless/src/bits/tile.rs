@@ -17,7 +17,7 @@ const LOW_X: u64 = 0x0101_0101_0101_0101;
 /// 8 × 8 × 8 bits, one cache line: bit `x` of byte `y` of word `z` is the point `[x, y, z]`.
 ///
 /// ```
-/// use marchless::{Face, bits::Tile};
+/// use marchless::{bits::Tile, cell::Face};
 ///
 /// let mut tile = Tile::default();
 /// tile.set([6, 0, 3], true)?;
@@ -88,7 +88,7 @@ impl Tile {
     }
 
     /// The case index of each of the cells whose first corner lies in the tile, `[8·8·8]`, x fastest: bit k is
-    /// [`Corner`](crate::Corner) k. Corners beyond the tile count as zero.
+    /// [`Corner`](crate::cell::Corner) k. Corners beyond the tile count as zero.
     pub fn case_masks(&self) -> [u8; 512] {
         dispatch(Backend::fastest(), OneTile([self, &NONE, &NONE, &NONE, &NONE, &NONE, &NONE, &NONE]))
     }
@@ -165,7 +165,7 @@ impl TileGrid {
     }
 
     /// The case index of each of the cells whose first corner lies in this tile, `[8·8·8]`, x fastest: bit k is
-    /// [`Corner`](crate::Corner) k, which may lie in one of the tiles behind it. Corners beyond the grid count as zero.
+    /// [`Corner`](crate::cell::Corner) k, which may lie in one of the tiles behind it. Corners beyond the grid count as zero.
     /// `None` where there is no such tile.
     pub fn case_masks(&self, position: [u32; 3]) -> Option<[u8; 512]> {
         self.tile(position)?;

@@ -1,8 +1,9 @@
 //! Case masks of rows and of tiles, beside what each cell's corners say.
 
 use marchless::{
-    Corner, Face, Shape,
+    Shape,
     bits::{BitGrid, BitsError, Tile, TileGrid},
+    cell::{Corner, Face},
 };
 use proptest::prelude::*;
 

@@ -8,8 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fastrand::Rng;
 use marchless::{
-    CaseIndex, Corner, Edge, MeshReport,
+    MeshReport,
     cases::{CROSSED_EDGES, TRIANGLE_COUNTS, TRIANGLES},
+    cell::{CaseIndex, Corner, Edge},
 };
 
 /// A directed line between the crossings of two edges.

@@ -3,7 +3,8 @@
 
 use std::collections::HashMap;
 
-use marchless::{CaseIndex, MeshBuffer, MeshSettings, Mesher, Weight};
+use marchless::cell::CaseIndex;
+use marchless::{MeshBuffer, MeshSettings, Mesher, Weight};
 use proptest::prelude::*;
 
 use crate::support::{Field, TestWeight};
