@@ -1,4 +1,4 @@
-//! [`TerrainBits`]: what of a terrain is solid, as bits: collision, what hangs together, and what hangs free.
+//! [`TerrainBits`]: the solid points of a terrain as bits, for collision, connectivity and loose islands.
 
 mod cache;
 mod island;
@@ -21,31 +21,36 @@ pub use island::Island;
 use part::{ChunkPart, SolidQuery, parts, within};
 pub use snapshot::BitsSnapshot;
 
-/// The questions about what is solid, and what answers are made of.
+/// [`TerrainBits`] and the types of its arguments and results.
 pub mod prelude {
     pub use super::{BitsSnapshot, Island, Phase, TerrainBits, TerrainBitsError};
     pub use marchless::Region;
     pub use marchless::bits::BitGrid;
 }
 
-/// Questions to terrains about what is solid: the lattice points whose samples are inside at the terrain's isovalue.
+/// A system parameter with queries about the solid points of terrains: the lattice points whose samples are inside at
+/// the terrain's isovalue.
 ///
-/// Everything is in the terrain's lattice: in voxels, from its lowest corner
-/// ([`TerrainQuery::to_lattice`](crate::query::TerrainQuery::to_lattice) gives them). On the terrain's outermost planes and beyond, all is air.
+/// All coordinates are in the terrain's lattice: in voxels, from the terrain's lowest corner.
+/// [`TerrainQuery::to_lattice`](crate::query::TerrainQuery::to_lattice) converts from world space. The terrain's
+/// outermost planes, and everything beyond them, are air.
 ///
-/// Answers are based on the newest samples: with all stamps that the plugin has applied, which it does in `PostUpdate`, and
-/// perhaps before their meshes show. Stamps written in the same update are not among them, nor are settings changed in it.
-/// Where a question needs a chunk that is not filled yet, it says so.
+/// Queries read the newest samples, with every stamp that the plugin has applied. It applies stamps in `PostUpdate`,
+/// perhaps before their meshes show. Stamps that were written and settings that were changed in the same update do not
+/// count yet. A query that needs a chunk that is not filled yet returns [`TerrainBitsError::NotFilled`].
 ///
-/// Bits are derived from samples chunk by chunk, when a question first needs them, and kept until these samples change;
-/// a chunk that is all ground or all air costs none.
+/// A chunk's bits are derived from its samples when a query first needs them, and kept until these samples change. A
+/// chunk that is all ground or all air needs no bits.
 ///
-/// # What takes how long
-/// To derive the bits of a chunk of 32³ samples takes about 20 µs, once. [`is_solid`](Self::is_solid) and the questions about what
-/// overlaps then take about a microsecond for each chunk they touch, and are meant for the main thread, hundreds
-/// of them an update. The others gather the bits of a box: on hills, [`bits`](Self::bits) stays under a millisecond up to
-/// 192³ points, [`connected`](Self::connected) and [`islands`](Self::islands) up to 128³ (measured on one server core); ground
-/// full of holes takes longer. For larger boxes take a [`snapshot`](Self::snapshot), which takes microseconds, and ask it
+/// # Performance
+/// Deriving the bits of a chunk of 32³ samples takes about 20 µs, once. After that, [`is_solid`](Self::is_solid),
+/// [`overlaps_region`](Self::overlaps_region), [`overlaps_ball`](Self::overlaps_ball) and [`collides`](Self::collides)
+/// take about a microsecond for each chunk that they touch. They are meant for the main thread, hundreds of calls per
+/// update.
+///
+/// The others gather the bits of a box. On hills, [`bits`](Self::bits) takes less than a millisecond up to 192³ points,
+/// [`connected`](Self::connected) and [`islands`](Self::islands) up to 128³ (measured on one server core). Ground full
+/// of holes takes longer. For larger boxes take a [`snapshot`](Self::snapshot), which takes microseconds, and query it
 /// [in a task](BitsSnapshot::in_task).
 ///
 /// ```
@@ -66,7 +71,7 @@ pub struct TerrainBits<'w, 's> {
     terrains: Query<'w, 's, (&'static TerrainVolume, &'static BitsCache)>,
 }
 
-/// Keeps the bits that have been asked for, as [`TerrainBits`] needs it.
+/// Gives each terrain the cache of bits that [`TerrainBits`] needs.
 #[derive(Default)]
 pub struct BitsPlugin;
 
@@ -76,21 +81,21 @@ impl Plugin for BitsPlugin {
     }
 }
 
-/// The medium that a path must stay inside.
+/// Solid or air: the phase that a path must stay inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// What is solid.
+    /// The solid points.
     Solid,
-    /// Everything else, the air beyond the terrain included.
+    /// All other points, including the air beyond the terrain.
     Air,
 }
 
 impl TerrainBits<'_, '_> {
-    /// How many words of 64 points a box may have whose bits are gathered: 2²², 32 MiB. A row along x takes
-    /// whole words.
+    /// The largest box whose bits can be gathered, in words of 64 points: 2²², or 32 MiB. Each row along x takes whole
+    /// words.
     pub const MAX_WORDS: u32 = 1 << 22;
 
-    /// Whether all points of a box are solid; so they are of an empty one.
+    /// True if every point of a box is solid; true for an empty box.
     ///
     /// # Errors
     /// [`TerrainBitsError::NoTerrain`], [`TerrainBitsError::NotFilled`].
@@ -107,7 +112,7 @@ impl TerrainBits<'_, '_> {
         Ok(true)
     }
 
-    /// Whether some point of a box is solid.
+    /// True if any point of a box is solid.
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`].
@@ -115,8 +120,10 @@ impl TerrainBits<'_, '_> {
         self.any_part(terrain, region, ChunkPart::is_partly_solid)
     }
 
-    /// Whether some solid point is at most `radius` from `center`. What lies on the sphere but for the rounding of `f32` may
-    /// count or not. A ball that is none (NaN, infinite, a negative radius) overlaps nothing.
+    /// True if any solid point is at most `radius` from `center`.
+    ///
+    /// A point on the sphere itself, within the rounding of `f32`, may count or not. An invalid ball (NaN, infinite, a
+    /// negative radius) overlaps nothing.
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`].
@@ -135,8 +142,9 @@ impl TerrainBits<'_, '_> {
         self.any_part(terrain, region, |part| part.overlaps_ball(center, radius))
     }
 
-    /// Whether a shape touches solid ground: whether some point is solid and also a point of the shape, whose point `p` lies
-    /// at `p + offset`.
+    /// True if a shape overlaps solid ground: if any of its points is solid.
+    ///
+    /// The shape's point `p` lies at `p + offset` in the terrain's lattice.
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`].
@@ -146,7 +154,7 @@ impl TerrainBits<'_, '_> {
         self.any_part(terrain, region, |part| part.overlaps(shape, offset))
     }
 
-    /// The bits of a box: its lowest point is the grid's point `[0, 0, 0]`.
+    /// The bits of a box; the box's lowest point is the grid's point `[0, 0, 0]`.
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`]; [`TerrainBitsError::Empty`], [`TerrainBitsError::TooLarge`].
@@ -154,7 +162,7 @@ impl TerrainBits<'_, '_> {
         self.snapshot(terrain, region)?.bits()
     }
 
-    /// Whether two points of a box are connected within it: see [`BitsSnapshot::connected`].
+    /// True if two points of a box are connected within it; see [`BitsSnapshot::connected`].
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`]; [`TerrainBitsError::TooLarge`].
@@ -164,12 +172,12 @@ impl TerrainBits<'_, '_> {
         a: IVec3,
         b: IVec3,
         region: Region,
-        medium: Phase,
+        phase: Phase,
     ) -> Result<bool, TerrainBitsError> {
-        self.snapshot(terrain, region)?.connected(a, b, medium)
+        self.snapshot(terrain, region)?.connected(a, b, phase)
     }
 
-    /// The islands that what is solid in a box falls into: see [`BitsSnapshot::islands`].
+    /// The islands of a box: the connected components of its solid points; see [`BitsSnapshot::islands`].
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`]; [`TerrainBitsError::TooLarge`].
@@ -177,10 +185,11 @@ impl TerrainBits<'_, '_> {
         self.snapshot(terrain, region)?.islands()
     }
 
-    /// The islands that hang free near an edit, in a box that reaches `margin` points beyond what it has changed.
+    /// The loose islands near an edit: those in the edit's bounds, grown by `margin` points on each side, that do not
+    /// touch the border of this box.
     ///
-    /// A island is found only if all of it lies within that box, and not at its border; what hung free there before the
-    /// edit is found, too.
+    /// An island is found only if it lies wholly inside the box and does not touch the border. Islands that were loose
+    /// before the edit are found, too.
     ///
     /// # Errors
     /// As [`TerrainBits::islands`].
@@ -189,9 +198,11 @@ impl TerrainBits<'_, '_> {
         self.snapshot(edited.terrain, region)?.loose_islands()
     }
 
-    /// The samples of a island alone, as they are now: put them on an entity, and it looks as it did in the terrain. The lowest
-    /// sample lies at two points below the island's bounds, since there is air all around. Takes milliseconds for
-    /// bounds of 64³ points.
+    /// The current samples of an island, without the ground around it. An entity with them looks like the island did in
+    /// the terrain.
+    ///
+    /// Two points of air surround the island, so the lowest sample lies two points below the island's bounds on each
+    /// axis. Takes milliseconds for bounds of 64³ points.
     ///
     /// # Errors
     /// [`TerrainBitsError::NoTerrain`].
@@ -202,7 +213,8 @@ impl TerrainBits<'_, '_> {
         Ok(island.samples(volume.grid(), settings))
     }
 
-    /// A box as it is now, to be asked [in a task](BitsSnapshot::in_task). Takes a fraction of a microsecond a chunk.
+    /// A snapshot of a box, which can be queried [in a task](BitsSnapshot::in_task). Takes a fraction of a microsecond
+    /// per chunk.
     ///
     /// # Errors
     /// As [`TerrainBits::is_solid`].
@@ -212,22 +224,23 @@ impl TerrainBits<'_, '_> {
         Ok(BitsSnapshot { region, inside: within(query.grid, region), parts })
     }
 
+    /// True if `test` holds for any chunk's part of a box.
     fn any_part(
         &self,
         terrain: Entity,
         region: Region,
-        question: impl Fn(&ChunkPart) -> Result<bool, TerrainBitsError>,
+        test: impl Fn(&ChunkPart) -> Result<bool, TerrainBitsError>,
     ) -> Result<bool, TerrainBitsError> {
         let query = self.query(terrain)?;
         for part in parts(query, region) {
-            if question(&part?)? {
+            if test(&part?)? {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// The terrain's samples, and the isovalue in effect.
+    /// The terrain's samples, its cache and the isovalue in effect.
     fn query(&self, terrain: Entity) -> Result<SolidQuery<'_>, TerrainBitsError> {
         let no_terrain = TerrainBitsError::NoTerrain { entity: terrain };
         let (volume, cache) = self.terrains.get(terrain).map_err(|_| no_terrain)?;
@@ -236,38 +249,38 @@ impl TerrainBits<'_, '_> {
     }
 }
 
-/// Why a question about a terrain's bits has no answer.
+/// An error of a query about a terrain's bits.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TerrainBitsError {
-    /// No terrain, or one that the plugin has not seen yet or whose settings it refused.
+    /// The entity has no terrain, or the plugin has not seen it yet or has refused its settings.
     #[error("entity {entity} has no terrain, or the plugin has not accepted its settings yet")]
     NoTerrain {
-        /// What was asked.
+        /// The entity that was queried.
         entity: Entity,
     },
-    /// The answer needs samples that are not there yet.
+    /// The query needs samples that are not there yet.
     #[error("chunk {chunk} is not filled yet")]
     NotFilled {
         /// The chunk's position, in chunks.
         chunk: IVec3,
     },
-    /// There is no grid without points.
+    /// The box is empty, but a grid must have points.
     #[error("a box of bits must hold a point, but it is {:?} up to, but without, {:?}", region.min, region.max)]
     Empty {
-        /// What was asked for.
+        /// The box that was given.
         region: Region,
     },
-    /// So many bits are not gathered.
+    /// The box exceeds [`TerrainBits::MAX_WORDS`].
     #[error(
         "a box of bits must not exceed {} words of 64 points, but it is {:?} up to, but without, {:?}",
         TerrainBits::MAX_WORDS, region.min, region.max
     )]
     TooLarge {
-        /// What was asked for, or what of it the terrain reaches.
+        /// The box that was given, or the part of it inside the terrain.
         region: Region,
     },
-    /// Memory does not suffice.
+    /// There is not enough memory.
     #[error(transparent)]
     Bits(#[from] BitsError),
 }

@@ -1,4 +1,4 @@
-//! Sources: what a terrain is made of before anybody digs.
+//! Sources: the samples of a terrain before anybody digs.
 //!
 //! [noise]: ../../../../crates/bevy_marchless/docs/pictures/noise.png
 //! [ridges]: ../../../../crates/bevy_marchless/docs/pictures/ridges.png
@@ -12,30 +12,30 @@
 //!
 //! # Choosing one
 //!
-//! | you have | take | chunks skipped without sampling | time to fill |
+//! | you have | use | chunks skipped without sampling | cost of sampling |
 //! |---|---|---|---|
-//! | nothing yet: rolling hills, ridges | [`NoiseHeights`] (feature `noise`) | all but those at the surface | once per column |
-//! | a wish for caves and overhangs | [`NoiseDensity`] (feature `noise`) | above its ground | once per sample |
-//! | a world of your own: ridges, terraces, caves, rules for materials | [`Landscape`] (feature `noise`) | as its parts | as its parts |
-//! | real elevation, or a painted picture | [`HeightMap`] (feature `png`) | above and below its relief | once per column |
-//! | geometry: asteroids, rooms, tunnels | [`Sdf`] | wherever the surface is far | once per sample and nearby shape |
+//! | no data: hills, ridges | [`NoiseHeights`] (feature `noise`) | all that the surface misses | once per column |
+//! | no data: caves and overhangs | [`NoiseDensity`] (feature `noise`) | above its ground | once per sample |
+//! | a design of your own, in parts | [`Landscape`] (feature `noise`) | as its parts | as its parts |
+//! | real elevation, a painted picture | [`HeightMap`] (feature `png`) | above and below its relief | once per column |
+//! | geometry: asteroids, rooms, tunnels | [`Sdf`] | far from the surface | once per sample and nearby shape |
 //! | a formula | a closure `Fn([f64; 3]) -> f64` | none | once per sample |
-//! | a formula that changes no faster than you know | [`Lipschitz`] | wherever the surface is far | once per sample |
+//! | a formula with a known steepest change | [`Lipschitz`] | far from the surface | once per sample |
 //! | an empty space to draw in | [`Air`] | all | nothing |
-//! | something else | your own [`Source`] | those that its bounds name | yours |
+//! | something else | your own [`Source`] | where its bound is certain | your own |
 //!
-//! All of them say how far from the surface a point is: negative inside, positive outside. Near the surface this should
-//! be close to a true distance, since it decides where the mesh's vertices lie and how smooth its normals are; far away
-//! only the sign matters. Positions are in world units in the terrain's own space, whose origin is the terrain's lowest
-//! corner and in which y points up.
+//! Every source gives the signed distance from a point to the surface: negative inside, positive outside. Near the
+//! surface it should be close to the true distance, because it decides where the mesh's vertices lie and how smooth its
+//! normals are. Far away only the sign matters. Positions are in world units in the terrain's own space: the origin is
+//! the terrain's lowest corner, and y points up.
 //!
-//! Materials come from the source too: an [`Sdf`] has one per shape, noise and height maps take theirs from a list of [`Stratum`],
-//! a landscape from one of [`MaterialRule`].
+//! Sources give materials, too. An [`Sdf`] has one per shape. Noise and height maps use a list of [`Stratum`], a
+//! landscape a list of [`MaterialRule`].
 //!
 //! # Composing one
-//! A [`Landscape`] is made of [`LandscapeSettings`], plain data: a [`Solid`] of [`Layer`]s, [`Caves`], [`Tunnels`] and shapes,
-//! and rules for materials. Bounds compose with it, and so does what is evaluated: heights once per column, kept for the
-//! chunks above and below; 3-D noise nowhere above the ground.
+//! A [`Landscape`] is made of [`LandscapeSettings`], which are plain data: a [`Solid`] of [`Layer`]s, [`Caves`],
+//! [`Tunnels`] and shapes, and rules for materials. It bounds a region by the bounds of its parts. It evaluates heights
+//! once per column and keeps them for the chunks above and below. It evaluates no 3-D noise above the ground.
 //!
 //! ```
 //! # #[cfg(feature = "noise")] {
@@ -61,8 +61,8 @@
 //! # Ok::<(), bevy_marchless::source::SourceError>(())
 //! ```
 //!
-//! Sources are floating point: they promise the same samples on the same machine and build, and nothing across
-//! machines.
+//! Sources compute in floating point. They give the same samples on the same machine and build; they promise nothing
+//! across machines.
 //!
 #![cfg_attr(feature = "noise", doc = include_str!("../docs/sources.md"))]
 
@@ -105,7 +105,7 @@ pub use sdf::Sdf;
 #[cfg(any(feature = "noise", feature = "png"))]
 pub use strata::Stratum;
 
-/// Nothing but air: an empty space to draw in, or what a cleared terrain is made of.
+/// A source of air alone: an empty space to draw in, or a cleared terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 pub struct Air;
 
@@ -119,7 +119,7 @@ impl Source for Air {
     }
 }
 
-/// Why settings do not make a source.
+/// An error in the settings of a source.
 #[derive(Clone, Debug, PartialEq, Error, Reflect)]
 #[reflect(Debug, PartialEq, Clone)]
 #[non_exhaustive]
@@ -127,22 +127,22 @@ pub enum SourceError {
     /// A number is not finite or out of its range.
     #[error("{name} must be {expected}, but it is {found}")]
     Setting {
-        /// What the number is.
+        /// The setting.
         name: &'static str,
-        /// Which numbers are allowed.
+        /// The allowed range, in words.
         expected: &'static str,
-        /// What was given.
+        /// The number that was given.
         found: f64,
     },
     /// Layers or solids are nested too deeply.
     #[error("layers and solids must be nested at most {most} deep, but they are deeper")]
     Nested {
-        /// How deep they may be.
+        /// The greatest depth allowed.
         most: u32,
     },
 }
 
-/// Everything that sources are made of.
+/// All sources, their settings and the [`Source`] trait.
 pub mod prelude {
     #[cfg(any(feature = "noise", feature = "png"))]
     pub use super::Stratum;
@@ -156,14 +156,17 @@ pub mod prelude {
     pub use super::{HeightMap, HeightMapError, HeightMapSettings};
 }
 
-/// Heights, positions and lengths reach at most this far, in world units.
+/// The greatest height, coordinate or length that settings may have. [Units: world]
 pub(crate) const FARTHEST: f64 = 1e9;
 
-/// How many voxels away from the surface a region must be before a bound skips it, so that an isovalue other than zero
-/// still finds samples.
+/// A margin in distance values: a bound skips a region only if the surface is farther from all of it than this, so that
+/// an isovalue other than zero still finds samples. [Units: voxels]
+///
+/// It adds to the core's margin, which is in lattice points: the core grows the region by four points on each side
+/// before it calls [`Source::bound`].
 pub(crate) const BOUND_MARGIN: f64 = 4.0;
 
-/// `found`, where it is `valid`.
+/// Returns `found` if it is `valid`, else the error that names it.
 pub(crate) fn check(
     name: &'static str,
     expected: &'static str,
@@ -173,12 +176,12 @@ pub(crate) fn check(
     if valid(found) { Ok(found) } else { Err(SourceError::Setting { name, expected, found }) }
 }
 
-/// A length: more than 0 and at most [`FARTHEST`].
+/// Checks a length: more than 0 and at most [`FARTHEST`].
 pub(crate) fn check_length(name: &'static str, found: f64) -> Result<f64, SourceError> {
     check(name, "more than 0 and at most 1e9", found, |v| v > 0.0 && v <= FARTHEST)
 }
 
-/// A coordinate: from −[`FARTHEST`] to [`FARTHEST`].
+/// Checks a coordinate: from −[`FARTHEST`] to [`FARTHEST`].
 pub(crate) fn check_position(name: &'static str, found: f64) -> Result<f64, SourceError> {
     check(name, "from -1e9 to 1e9", found, |v| v.abs() <= FARTHEST)
 }
@@ -192,7 +195,7 @@ pub(crate) fn world_box(region: &SourceRegion) -> [[f64; 2]; 3] {
     })
 }
 
-/// A region's rows along x: local y and z of each, its distances and its materials.
+/// Iterates over a region's rows along x: each row's local y and z, its distances and its materials.
 pub(crate) fn rows<'a>(
     region: &SourceRegion,
     distances: &'a mut [f32],

@@ -1,9 +1,9 @@
-//! [`BitsCache`]: which samples of a terrain are solid, one bit each, chunk by chunk.
+//! [`BitsCache`]: the solid samples of a terrain, one bit each, chunk by chunk.
 //!
-//! Bits are derived once, by whoever needs them first and on whatever thread, and shared from then on. Samples lie behind
-//! an `Arc` and are copied on write, so their address tells whether they have changed: the cache holds a `Weak`, because
-//! of which an edit has to move them to another address even where nobody else holds them. Bits of samples that are gone
-//! are pruned once they may be half of all.
+//! Bits are derived once, on the thread that needs them first, and shared from then on. Samples lie behind an `Arc` and
+//! are copied on write, so a changed address means changed samples. The cache holds a `Weak` to them; because of it, an
+//! edit has to move the samples to another address even if nothing else holds them. Bits of dropped samples are pruned
+//! once they may be half of all.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
@@ -15,44 +15,44 @@ use marchless::{GridChunk, GridSamples, Region, Samples, Shape, Weight as _};
 use super::TerrainBitsError;
 use super::part::SolidQuery;
 
-/// The bits of those chunks of a terrain that somebody has asked for.
+/// The bits of a terrain's chunks, as far as queries have needed them.
 #[derive(Component, Default)]
 pub(crate) struct BitsCache(Mutex<CacheEntries>);
 
 #[derive(Default)]
 struct CacheEntries {
     chunks: BTreeMap<[i32; 3], CacheEntry>,
-    /// When there are this many, those of samples that are gone are pruned.
+    /// Once there are this many entries, stale ones are pruned.
     prune_at: usize,
 }
 
-/// The bits of this many chunks are kept without looking which of them are stale.
+/// The number of entries below which stale ones are not looked for.
 const FEW: usize = 64;
 
 struct CacheEntry {
-    /// What the bits are derived from.
+    /// The samples that the bits are derived from.
     samples: Weak<GridSamples<i16>>,
     settings: BitsSettings,
     bits: Arc<OnceLock<Derived>>,
 }
 
-/// What is solid in a chunk.
+/// The solid points of a chunk, derived from its samples.
 #[derive(Debug)]
 pub(super) enum Derived {
-    /// All of it, or nothing.
+    /// All points (true) or none (false).
     Uniform(bool),
     /// The chunk's points; a row is one word.
     Mixed(BitGrid),
 }
 
-/// What is solid in a chunk, not derived before somebody looks. Cheap to clone, and unaffected by later edits.
+/// The solid points of a chunk, derived when first read. Cheap to clone, and unaffected by later edits.
 #[derive(Clone, Debug)]
 pub(super) enum ChunkBits {
     Uniform(bool),
     Lazy { samples: Arc<GridSamples<i16>>, settings: BitsSettings, bits: Arc<OnceLock<Derived>> },
 }
 
-/// What bits depend on besides samples.
+/// The settings that a chunk's bits depend on, besides its samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BitsSettings {
     isovalue: f32,
@@ -62,8 +62,8 @@ pub(super) struct BitsSettings {
 }
 
 impl BitsCache {
-    /// Where the bits of a chunk with these samples are, or will be.
-    fn place(
+    /// The entry for the bits of a chunk with these samples, which may not be derived yet.
+    fn entry(
         &self,
         position: [i32; 3],
         samples: &Arc<GridSamples<i16>>,
@@ -91,7 +91,7 @@ impl BitsCache {
 }
 
 impl ChunkBits {
-    /// What is solid in the chunk at `position`.
+    /// The solid points of the chunk at `position`, not derived yet.
     ///
     /// # Errors
     /// [`TerrainBitsError::NotFilled`].
@@ -106,16 +106,16 @@ impl ChunkBits {
                 let lowest =
                     grid.bounds().map_or([false; 3], |bounds| [0, 1, 2].map(|axis| position[axis] == bounds.min[axis]));
                 let settings = BitsSettings { isovalue, cells: grid.chunk_cells(), lowest };
-                let bits = cache.place(position, samples, settings);
+                let bits = cache.entry(position, samples, settings);
                 Ok(Self::Lazy { samples: samples.clone(), settings, bits })
             }
         }
     }
 
-    /// What is solid; derived where that has not been done.
+    /// The solid points; derives them on the first call.
     ///
     /// # Errors
-    /// [`TerrainBitsError::Bits`] where memory does not suffice.
+    /// [`TerrainBitsError::Bits`] if there is not enough memory.
     pub(super) fn get(&self) -> Result<&Derived, TerrainBitsError> {
         match self {
             Self::Uniform(true) => Ok(&Derived::Uniform(true)),
@@ -136,7 +136,7 @@ impl BitsSettings {
         let shape = Shape::cube(self.cells).expect("a chunk has samples");
         let samples = Samples::new(shape, &samples.weights).expect("the grid has checked their number");
         let mut bits = BitGrid::from_samples(samples, self.isovalue)?;
-        // Meshes are cut off there.
+        // The terrain's outermost planes are air: meshes are cut off there.
         for axis in (0..3).filter(|axis| self.lowest[*axis]) {
             let mut layer = Region::new([0; 3], [self.cells as i32; 3]);
             layer.max[axis] = 1;
@@ -171,7 +171,7 @@ mod tests {
         let (mut grid, cache) = (one_chunk(), BitsCache::default());
         let solid = Voxel::new(-256, 0);
         grid.set([3, 3, 3], solid).unwrap();
-        // With nobody else who holds the samples, and with somebody.
+        // Once the cache alone refers to the samples, once another grid holds them, too.
         for others in [vec![], vec![grid.clone()]] {
             let first = place(&grid, &cache, 0.0);
             assert!(Arc::ptr_eq(&first, &place(&grid, &cache, 0.0)), "asked for twice");

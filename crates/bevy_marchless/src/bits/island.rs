@@ -1,4 +1,4 @@
-//! [`Island`]: a part of what is solid that hangs together.
+//! [`Island`]: a connected component of solid points.
 
 use core::fmt;
 use std::sync::Arc;
@@ -12,15 +12,18 @@ use crate::brush::{BrushShape, Stamp};
 use crate::mesh::ChunkSamples;
 use crate::terrain::Terrain;
 
-/// A part of what is solid in a box of a terrain that hangs together, as it was when it was found.
+/// A connected component of the solid points in a box of a terrain, as it was when it was found.
+///
+/// Islands are equal if their points are equal.
 #[derive(Clone)]
 pub struct Island {
     bounds: Region,
     first: [i32; 3],
     size: usize,
     touches_boundary: bool,
-    /// The whole box, and its lowest point.
+    /// All solid points of the searched box.
     solid: Arc<BitGrid>,
+    /// The lowest point of the searched box.
     corner: [i32; 3],
 }
 
@@ -44,7 +47,7 @@ impl Island {
         self.bounds
     }
 
-    /// How many points it has: its volume in cubic voxels.
+    /// The number of its points: its volume in cubic voxels.
     pub const fn size(&self) -> usize {
         self.size
     }
@@ -54,27 +57,28 @@ impl Island {
         self.first.into()
     }
 
-    /// Whether it touches the border of the box in which it was found, or of the terrain, and so counts as held: it may
-    /// go on beyond that box, and at the terrain's walls and bottom something must hold the ground. What is not held
-    /// hangs free: it is whole, and nothing solid is next to it.
+    /// True if it touches the border of the box in which it was found, or the border of the terrain.
+    ///
+    /// Such an island may continue beyond the box, and the terrain's walls and bottom count as support. An island that
+    /// does not touch the boundary is loose: it is complete, and no solid point is next to it.
     pub const fn touches_boundary(&self) -> bool {
         self.touches_boundary
     }
 
-    /// Its points: a grid of the size of its bounds, whose lowest point is the grid's point `[0, 0, 0]`.
+    /// Its points, in a grid of the size of its bounds; their lowest point is the grid's point `[0, 0, 0]`.
     pub fn bits(&self) -> BitGrid {
         let first = [0, 1, 2].map(|axis| self.first[axis].abs_diff(self.bounds.min[axis]));
         self.around().flood(&[first], Connectivity::Six).expect("its first point lies in its bounds")
     }
 
-    /// All that is solid in its bounds.
+    /// All solid points in its bounds, other islands' included.
     fn around(&self) -> BitGrid {
         let [min, max] = [self.bounds.min, self.bounds.max];
         let [min, max] = [min, max].map(|end| [0, 1, 2].map(|axis| end[axis] - self.corner[axis]));
         self.solid.cut(Region::new(min, max)).expect("the box in which it was found is larger")
     }
 
-    /// Its samples as they are in the terrain now, with two points of air on each side.
+    /// Its current samples in the terrain, with two points of air on each side.
     pub(super) fn samples(&self, grid: &Grid<i16>, settings: &Terrain) -> ChunkSamples {
         let (own, region, isovalue) = (self.bits(), self.bounds.grown(RIM, RIM), settings.isovalue);
         let is_own = |point: [i32; 3]| {
@@ -87,7 +91,7 @@ impl Island {
             if weight >= isovalue || is_own(point) {
                 return voxel;
             }
-            // Of another island: as far outside as it is inside.
+            // A point of another island becomes air, as far outside the surface as it was inside.
             Voxel { weight: i16::from_voxels((2.0 * isovalue - weight).max(isovalue + 1.0 / 256.0)), ..voxel }
         };
         let (weights, materials) = region.points().map(voxel).map(|voxel| (voxel.weight, voxel.material)).unzip();
@@ -99,16 +103,16 @@ impl Island {
         samples
     }
 
-    /// Stamps that dig it out of `terrain`, and nothing else: all its points become air, and no other point changes sides.
-    /// Surfaces less than half a voxel away may move a little.
+    /// The stamps that dig exactly this island out of `terrain`: all its points become air, and no other point changes
+    /// sides. Surfaces less than half a voxel away may move a little.
     ///
-    /// What the terrain has become since the island was found, the stamps do not know: write them in
-    /// the same update, or ask again before.
+    /// The stamps do not account for edits since the island was found. Write them in the same update, or search again
+    /// first.
     pub fn stamps(&self, terrain: Entity) -> Vec<Stamp> {
         let (own, mut others) = (self.bits(), self.around());
         others.subtract(&own).expect("both have the size of its bounds");
-        // How far beyond its outermost points a box ends: at these, samples become half a voxel of air, and at those
-        // next to them at least half a voxel of ground stays.
+        // A box ends this far beyond the outermost points, in voxels: samples there become half a voxel of air, and
+        // their neighbours keep at least half a voxel of ground.
         let rim = 0.5;
         let origin = IVec3::from(self.bounds.min).as_dvec3();
         let mut stamps = Vec::new();
@@ -132,12 +136,12 @@ impl Island {
     }
 }
 
-/// How many points of air a island's samples have on each side: one for the surface, one for its normals.
+/// The points of air on each side of an island's samples: one for the surface, one for its normals.
 const RIM: u32 = 2;
 /// The longest box that one stamp digs. [Units: voxels]
 const LONGEST_BOX: u32 = 2000;
 
-/// The smallest box around what is set in a region.
+/// The smallest box around the set points of a region; `None` if there are none.
 fn shrunk(bits: &BitGrid, mut region: Region) -> Option<Region> {
     if !bits.overlaps_region(region) {
         return None;
@@ -168,7 +172,6 @@ impl fmt::Debug for Island {
     }
 }
 
-/// Pieces are equal where their points are.
 impl PartialEq for Island {
     fn eq(&self, other: &Self) -> bool {
         let summary = |island: &Self| (island.bounds, island.first, island.size, island.touches_boundary);

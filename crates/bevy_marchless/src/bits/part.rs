@@ -1,4 +1,4 @@
-//! [`ChunkPart`]: what a question reads of one chunk.
+//! [`ChunkPart`]: the part of one chunk that a query reads.
 
 use bevy_math::DVec3;
 use marchless::bits::BitGrid;
@@ -7,32 +7,32 @@ use marchless::{Grid, Region};
 use super::TerrainBitsError;
 use super::cache::{BitsCache, ChunkBits, Derived};
 
-/// What is solid in a terrain, and where the bits of it are kept.
+/// The data that queries about a terrain's solid points read.
 #[derive(Clone, Copy)]
 pub(super) struct SolidQuery<'a> {
     pub(super) grid: &'a Grid<i16>,
     pub(super) cache: &'a BitsCache,
-    /// In voxels.
+    /// The isovalue in effect. [Units: voxels]
     pub(super) isovalue: f32,
 }
 
-/// What a question reads of one chunk; everything in the terrain's lattice.
+/// The part of one chunk that a query reads, in the terrain's lattice.
 #[derive(Clone, Debug)]
 pub(super) struct ChunkPart {
-    /// Points of the chunk; never empty.
+    /// The points to read; never empty.
     region: Region,
     /// The chunk's lowest point.
     origin: [i32; 3],
     bits: ChunkBits,
 }
 
-/// What of `region` lies within the terrain's outermost planes: on them and beyond, all is air.
+/// The part of `region` inside the terrain's outermost planes; on them and beyond, all points are air.
 pub(super) fn within(grid: &Grid<i16>, region: Region) -> Region {
     let Some(planes) = grid.planes() else { return NOTHING };
     Region::new(planes.min.map(|v| v + 1), planes.max).intersection(&region)
 }
 
-/// What `region` has in common with each chunk; beyond the chunks all is air.
+/// The parts of `region` in each chunk; points beyond all chunks are air.
 pub(super) fn parts(
     query: SolidQuery<'_>,
     region: Region,
@@ -55,7 +55,7 @@ pub(super) fn parts(
 const NOTHING: Region = Region::new([0; 3], [0; 3]);
 
 impl ChunkPart {
-    /// Whether all of it is solid.
+    /// True if all of its points are solid.
     pub(super) fn is_solid(&self) -> Result<bool, TerrainBitsError> {
         Ok(match self.bits.get()? {
             Derived::Uniform(solid) => *solid,
@@ -63,7 +63,7 @@ impl ChunkPart {
         })
     }
 
-    /// Whether some of it is solid.
+    /// True if any of its points is solid.
     pub(super) fn is_partly_solid(&self) -> Result<bool, TerrainBitsError> {
         Ok(match self.bits.get()? {
             Derived::Uniform(solid) => *solid,
@@ -71,7 +71,7 @@ impl ChunkPart {
         })
     }
 
-    /// Whether a solid point of it is at most `radius` from `center`.
+    /// True if any of its solid points is at most `radius` from `center`.
     pub(super) fn overlaps_ball(&self, center: DVec3, radius: f32) -> Result<bool, TerrainBitsError> {
         Ok(match self.bits.get()? {
             Derived::Uniform(solid) => *solid && ball_reaches(center, radius, self.region),
@@ -82,7 +82,7 @@ impl ChunkPart {
         })
     }
 
-    /// Whether a solid point of it is a point of `shape`, whose lowest corner lies at `offset`.
+    /// True if any of its solid points is a point of `shape`, whose lowest corner lies at `offset`.
     pub(super) fn overlaps(&self, shape: &BitGrid, offset: [i32; 3]) -> Result<bool, TerrainBitsError> {
         Ok(match self.bits.get()? {
             Derived::Uniform(solid) => *solid && shape.overlaps_region(relative(self.region, offset)),
@@ -101,7 +101,7 @@ impl ChunkPart {
     }
 }
 
-/// A region as seen from `corner`.
+/// A region relative to `corner`.
 fn relative(region: Region, corner: [i32; 3]) -> Region {
     Region::new(difference(region.min, corner), difference(region.max, corner))
 }
@@ -110,7 +110,7 @@ fn difference(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
     [0, 1, 2].map(|axis| a[axis].saturating_sub(b[axis]))
 }
 
-/// Whether some point of a region that is not empty is at most `radius` from `center`.
+/// True if any point of a non-empty region is at most `radius` from `center`.
 fn ball_reaches(center: DVec3, radius: f32, region: Region) -> bool {
     let distances = [0, 1, 2].map(|axis| {
         let center = center[axis];

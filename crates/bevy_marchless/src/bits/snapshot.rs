@@ -1,4 +1,4 @@
-//! [`BitsSnapshot`]: a box of a terrain as it is now, to be asked on any thread.
+//! [`BitsSnapshot`]: the solid points of a box at one moment, for queries on any thread.
 
 use core::fmt;
 use std::sync::Arc;
@@ -11,16 +11,16 @@ use marchless::{Region, Shape};
 use super::part::ChunkPart;
 use super::{Island, Phase, TerrainBits, TerrainBitsError};
 
-/// A box of a terrain as it was when the snapshot was taken, whatever becomes of the terrain: what
-/// [`TerrainBits`] answers about boxes, on any thread.
+/// The solid points of a box of a terrain at one moment. Later changes of the terrain do not affect it.
 ///
-/// Taking one copies nothing: it shares the samples with the terrain, and bits that it derives are kept there for others.
-/// As long as it lives, an edit in the box has to copy the chunk's samples.
+/// It answers the queries of [`TerrainBits`] about boxes, on any thread. Taking a snapshot copies no samples: it shares
+/// them with the terrain. Bits that it derives are kept in the terrain's cache, too. While a snapshot lives, an edit in
+/// the box has to copy the chunk's samples.
 #[derive(Clone)]
 pub struct BitsSnapshot {
-    /// What was asked for.
+    /// The whole box.
     pub(super) region: Region,
-    /// What of it may be solid.
+    /// The part of the box that may be solid.
     pub(super) inside: Region,
     pub(super) parts: Vec<ChunkPart>,
 }
@@ -31,7 +31,7 @@ impl BitsSnapshot {
         self.region
     }
 
-    /// Asks in a task of the [`AsyncComputeTaskPool`]. Dropping the task withdraws the question.
+    /// Runs a query in a task of the [`AsyncComputeTaskPool`]. Dropping the task cancels it.
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
@@ -42,7 +42,7 @@ impl BitsSnapshot {
     /// #[derive(Resource, Default)]
     /// struct Search(Option<Task<Result<Vec<Island>, TerrainBitsError>>>);
     ///
-    /// fn ask(mut edits: MessageReader<TerrainEdited>, bits: TerrainBits, mut search: ResMut<Search>) {
+    /// fn start_search(mut edits: MessageReader<TerrainEdited>, bits: TerrainBits, mut search: ResMut<Search>) {
     ///     for edited in edits.read() {
     ///         let region = Region::new(edited.min.to_array(), edited.max.to_array()).grown(64, 64);
     ///         if let Ok(snapshot) = bits.snapshot(edited.terrain, region) {
@@ -51,18 +51,18 @@ impl BitsSnapshot {
     ///     }
     /// }
     ///
-    /// fn answer(mut search: ResMut<Search>) {
+    /// fn poll_search(mut search: ResMut<Search>) {
     ///     if let Some(Ok(islands)) = search.0.as_mut().and_then(check_ready) {
     ///         println!("{} islands hang free", islands.iter().filter(|island| !island.touches_boundary()).count());
     ///         search.0 = None;
     ///     }
     /// }
     /// ```
-    pub fn in_task<T: Send + 'static>(self, question: impl FnOnce(&Self) -> T + Send + 'static) -> Task<T> {
-        AsyncComputeTaskPool::get_or_init(TaskPool::default).spawn(async move { question(&self) })
+    pub fn in_task<T: Send + 'static>(self, query: impl FnOnce(&Self) -> T + Send + 'static) -> Task<T> {
+        AsyncComputeTaskPool::get_or_init(TaskPool::default).spawn(async move { query(&self) })
     }
 
-    /// The bits of the box: its lowest point is the grid's point `[0, 0, 0]`.
+    /// The bits of the box; the box's lowest point is the grid's point `[0, 0, 0]`.
     ///
     /// # Errors
     /// [`TerrainBitsError::Empty`], [`TerrainBitsError::TooLarge`].
@@ -70,15 +70,16 @@ impl BitsSnapshot {
         self.assemble(self.region)
     }
 
-    /// Whether a way within the box leads from `a` to `b` through what is solid, or through the air. As surfaces have
-    /// it, solid points are neighbours along the axes, and points of air along the diagonals of faces, too.
+    /// True if a path inside the box leads from `a` to `b` through points of one phase.
     ///
-    /// `false` where one of them is outside the box or of the other medium.
+    /// Solid points are neighbours along the axes only; points of air also along the diagonals of faces. This agrees
+    /// with the mesh, which separates solid points across a diagonal. False if `a` or `b` is outside the box or of the
+    /// other phase.
     ///
     /// # Errors
     /// [`TerrainBitsError::TooLarge`].
-    pub fn connected(&self, a: IVec3, b: IVec3, medium: Phase) -> Result<bool, TerrainBitsError> {
-        let (region, connectivity) = match medium {
+    pub fn connected(&self, a: IVec3, b: IVec3, phase: Phase) -> Result<bool, TerrainBitsError> {
+        let (region, connectivity) = match phase {
             Phase::Solid => (self.inside, Connectivity::Six),
             Phase::Air => (self.region, Connectivity::Eighteen),
         };
@@ -87,17 +88,18 @@ impl BitsSnapshot {
             return Ok(false);
         }
         let mut mask = self.assemble(region)?;
-        if medium == Phase::Air {
+        if phase == Phase::Air {
             mask.invert();
         }
         let [a, b] = ends.map(|end| [0, 1, 2].map(|axis| end[axis].abs_diff(region.min[axis])));
         Ok(mask.get(a) && mask.get(b) && mask.flood(&[a], connectivity)?.get(b))
     }
 
-    /// The islands that what is solid in the box falls into, numbered by their first points, x fastest.
+    /// The islands of the box: the connected components of its solid points, in order of their first points, x fastest.
     ///
-    /// Solid points are neighbours along the axes, as surfaces have it: islands touch at edges and corners at most, and
-    /// the mesh of each is closed. [`Island::touches_boundary`] tells which of them may go on beyond the box.
+    /// Solid points are neighbours along the axes only, as in the mesh. So islands touch at edges and corners at most,
+    /// and the mesh of each is closed. An island that [touches the boundary](Island::touches_boundary) may continue
+    /// beyond the box.
     ///
     /// # Errors
     /// [`TerrainBitsError::TooLarge`].
@@ -110,7 +112,7 @@ impl BitsSnapshot {
         Ok(components.iter().map(|component| Island::new(*component, self.inside, &solid)).collect())
     }
 
-    /// Those of the [islands](Self::islands) that hang free.
+    /// The [islands](Self::islands) that do not [touch the boundary](Island::touches_boundary).
     ///
     /// # Errors
     /// [`TerrainBitsError::TooLarge`].
@@ -120,6 +122,7 @@ impl BitsSnapshot {
         Ok(islands)
     }
 
+    /// Gathers the bits of all parts in one grid.
     fn assemble(&self, region: Region) -> Result<BitGrid, TerrainBitsError> {
         let [nx, ny, nz] = region.size();
         let shape = Shape::new([nx, ny, nz]).map_err(|_| {
