@@ -1,21 +1,21 @@
-//! How chunks get components beyond the plugin's own.
+//! Components that chunks inherit from their terrain: [`ChunkComponentPlugin`].
 //!
-//! Chunks are entities that the plugin spawns and despawns as terrain loads, so a game gives their components to the
-//! terrain, or has a system or an observer give them to each chunk.
+//! The plugin spawns and despawns chunks as terrain loads. So a game gives its components to the terrain, or lets an
+//! observer or a system give them to each chunk.
 //!
-//! # The same for all chunks of a terrain
-//! Give the component to the terrain, and add a [`ChunkComponentPlugin`] for its type. Chunks get a copy as soon as they
-//! are there, before they are first drawn, and follow its changes and its removal.
+//! # The same component for all chunks
+//! Give the component to the terrain, and add a [`ChunkComponentPlugin`] for its type. Each chunk gets a copy when it
+//! is spawned, before it is first drawn. Chunks follow when the terrain's component changes or is removed.
 //!
-//! It is there for `RenderLayers`, `NoFrustumCulling` and `VisibilityRange` ([`InheritPlugin`]), with feature `pbr` for
-//! `NotShadowCaster` and `NotShadowReceiver` too, and for each type of material that has a `TerrainMaterialPlugin`.
+//! [`InheritPlugin`] does this for `RenderLayers`, `NoFrustumCulling` and `VisibilityRange`, and with feature `pbr` for
+//! `NotShadowCaster` and `NotShadowReceiver`. A `TerrainMaterialPlugin` does it for a type of material.
 //!
 //! ```
 //! use bevy_app::prelude::*;
 //! use bevy_ecs::prelude::*;
 //! use bevy_marchless::prelude::*;
 //!
-//! /// Which footsteps are heard.
+//! /// The ground that footsteps sound like.
 //! #[derive(Component, Clone)]
 //! enum Ground { Gravel, Snow }
 //!
@@ -28,9 +28,9 @@
 //! }
 //! ```
 //!
-//! # Another for each chunk
-//! Observe `On<Add, Chunk>`, which costs nothing while no chunk is new. The chunk has its place, its
-//! [`ChunkGeometry`](crate::chunk::ChunkGeometry) and its `Aabb` by then; its `Mesh3d` follows with the same commands.
+//! # A component of its own for each chunk
+//! Observe `On<Add, Chunk>`, which costs nothing while no chunk is new. The chunk already has its transform, its
+//! [`ChunkGeometry`](crate::chunk::ChunkGeometry) and its `Aabb`; its `Mesh3d` follows with the same commands.
 //!
 //! ```
 //! use bevy_ecs::prelude::*;
@@ -46,11 +46,10 @@
 //! }
 //! ```
 //!
-//! Or put a system with a query for `Added<Chunk>` into
-//! [`MarchlessSystems::Decorate`], where the update's new chunks have all their components, `Mesh3d` included. Bevy finds
-//! what was added by a look at every chunk.
+//! Or add a system with a query for `Added<Chunk>` to [`MarchlessSystems::Decorate`]. There the update's new chunks
+//! have all their components, including `Mesh3d`. Such a query checks every chunk in every update.
 //!
-//! A chunk to which the game gives a value of its own keeps it until the terrain's changes or goes.
+//! A value that the game gives to a single chunk stays until the terrain's component changes or is removed.
 
 use core::marker::PhantomData;
 
@@ -67,11 +66,11 @@ use crate::chunk::Chunk;
 use crate::schedule::MarchlessSystems;
 use crate::terrain::Terrain;
 
-/// Gives a terrain's `C` to its chunks and follows its changes, also while the terrain is disabled (`Disabled`).
+/// Gives a terrain's component `C` to its chunks and follows its changes, also while the terrain is `Disabled`.
 ///
-/// It may be added at any time and more than once; terrains and chunks that are there already count. Changes reach
-/// chunks in [`MarchlessSystems::Decorate`], removals at once. `C` may be immutable. It must be none of the components
-/// that the plugin itself gives to chunks, such as `Transform`: those would be overwritten.
+/// It may be added at any time, and more than once; terrains and chunks that exist already are included. Changes reach
+/// chunks in [`MarchlessSystems::Decorate`], removals at once. `C` may be immutable. It must not be a component that
+/// the plugin itself gives to chunks, such as `Transform`, because it would overwrite the chunk's own.
 pub struct ChunkComponentPlugin<C: Component + Clone>(PhantomData<fn() -> C>);
 
 impl<C: Component + Clone> Default for ChunkComponentPlugin<C> {
@@ -98,8 +97,8 @@ impl<C: Component + Clone> Plugin for ChunkComponentPlugin<C> {
     }
 }
 
-/// Gives chunks those components of their terrain by which Bevy decides who sees them: `RenderLayers`,
-/// `NoFrustumCulling` and `VisibilityRange`, and with feature `pbr` `NotShadowCaster` and `NotShadowReceiver`.
+/// Gives chunks the rendering components of their terrain: `RenderLayers`, `NoFrustumCulling` and `VisibilityRange`,
+/// and with feature `pbr` also `NotShadowCaster` and `NotShadowReceiver`.
 #[derive(Default)]
 pub struct InheritPlugin;
 
@@ -118,18 +117,18 @@ impl Plugin for InheritPlugin {
     }
 }
 
-/// The components that chunks get from their terrains.
+/// The component types that chunks inherit from their terrains.
 #[derive(Resource, Default)]
 struct Inherited(Vec<Inheritance>);
 
-/// One of them.
+/// A component type that chunks inherit.
 struct Inheritance {
     component: ComponentId,
-    /// Gives a new chunk a copy of its terrain's.
+    /// Gives a new chunk a copy of its terrain's component.
     give: fn(EntityRef, &mut EntityCommands),
 }
 
-/// A new chunk gets its terrain's components as soon as it is there: one observer for all types.
+/// Gives a new chunk its terrain's components, of all types in one observer.
 fn give_components(
     added: On<Add, Chunk>,
     chunks: Query<&Chunk>,
@@ -146,14 +145,14 @@ fn give_components(
     }
 }
 
-/// Another observer may have given the chunk a value of its own already, which stays.
+/// Copies the terrain's component to a new chunk, but keeps a value that another observer has given it already.
 fn give<C: Component + Clone>(terrain: EntityRef, chunk: &mut EntityCommands) {
     if let Some(component) = terrain.get::<C>() {
         chunk.try_insert_if_new(component.clone());
     }
 }
 
-/// Gives the chunks of terrains what has changed on them.
+/// Copies changed components from terrains to their chunks.
 fn hand_on<C: Component + Clone>(
     changed: Query<(&C, &Children), (Changed<C>, With<Terrain>, Allow<Disabled>)>,
     chunks: Query<Entity, (With<Chunk>, Allow<Disabled>)>,
@@ -166,7 +165,7 @@ fn hand_on<C: Component + Clone>(
     }
 }
 
-/// Chunks lose what their terrain loses.
+/// Removes a component from the chunks of a terrain that loses it.
 fn take_away<C: Component + Clone>(
     removed: On<Remove, C>,
     terrains: Query<&Children, (With<Terrain>, Allow<Disabled>)>,

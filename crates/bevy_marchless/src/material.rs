@@ -1,4 +1,4 @@
-//! [`TerrainMaterialPlugin`]: chunks are drawn with the `MeshMaterial3d` of their terrain.
+//! [`TerrainMaterialPlugin`]: draws chunks with the `MeshMaterial3d` of their terrain.
 
 use core::marker::PhantomData;
 
@@ -14,10 +14,10 @@ use crate::mesh::ChunkSamples;
 use crate::schedule::UpdatePhase;
 use crate::terrain::Terrain;
 
-/// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes, as [`ChunkComponentPlugin`] does, and has
-/// no plain material given to what has one of this type.
+/// Gives a terrain's `MeshMaterial3d<M>` to its chunks and follows its changes, as [`ChunkComponentPlugin`] does.
 ///
-/// [`StandardTerrainMaterialPlugin`] adds it for [`StandardMaterial`]; add it for each other type of material that terrains have.
+/// Terrains and standalone chunks with a material of this type get no plain material. [`StandardTerrainMaterialPlugin`]
+/// adds this plugin for [`StandardMaterial`]; add it for each other type of material that your terrains use.
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<M>);
 
 impl<M: Material> Default for TerrainMaterialPlugin<M> {
@@ -35,8 +35,10 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     }
 }
 
-/// Draws terrains and hand-made [`ChunkSamples`] with [`StandardMaterial`]: their own, or a plain one where they have none.
-/// That they have another is known where there is a [`TerrainMaterialPlugin`] for its type.
+/// Draws terrains and standalone [`ChunkSamples`] with [`StandardMaterial`]: their own, or a plain one if they have no
+/// material.
+///
+/// A material of another type is recognised only if there is a [`TerrainMaterialPlugin`] for its type.
 #[derive(Default)]
 pub struct StandardTerrainMaterialPlugin;
 
@@ -48,18 +50,18 @@ impl Plugin for StandardTerrainMaterialPlugin {
     }
 }
 
-/// The material components that some [`TerrainMaterialPlugin`] hands on.
+/// The types of material that have a [`TerrainMaterialPlugin`].
 #[derive(Resource, Default)]
 struct MaterialTypes(Vec<ComponentId>);
 
-/// On terrains and hand-made chunks that have been given the plain material.
+/// Marks terrains and standalone chunks that have been given the plain material.
 #[derive(Component, Clone)]
 struct PlainMaterial;
 
-/// Gives terrains and hand-made chunks without any material a plain one, which shows the palette's colours, and takes it
-/// away when they get another.
+/// Gives terrains and standalone chunks without a material a plain one, which shows the palette's colours. Removes it
+/// when they get a material of another type.
 fn give_default_material(
-    // Resources are components too; without them, `assets` may be changed meanwhile.
+    // Resources are components, too; this query must leave them out, because `assets` is borrowed mutably.
     drawn: Query<EntityRef, (Or<(With<Terrain>, With<ChunkSamples>)>, Without<IsResource>)>,
     types: Res<MaterialTypes>,
     assets: Option<ResMut<Assets<StandardMaterial>>>,
@@ -79,7 +81,7 @@ fn give_default_material(
     }
 }
 
-/// Without its samples an entity that was a hand-made chunk has no use for the plain material.
+/// Removes the plain material from a standalone chunk that loses its samples.
 fn take_away_plain_material(
     removed: On<Remove, ChunkSamples>,
     plain: Query<(), (With<PlainMaterial>, Without<Terrain>)>,

@@ -1,11 +1,11 @@
-//! Changed chunks become groups, groups are meshed, and a complete group is shown in one update.
+//! Meshing and showing chunks: changed chunks become groups, and each complete group is shown in one update.
 //!
-//! A group is meshed from one snapshot of the samples, and all its chunks change at once: there is never a crack
-//! between a chunk that shows an edit and one that does not yet. While a group is being meshed its chunks are claimed;
-//! edits of claimed chunks wait, become one set, and start from the newest samples when the group is done. So results
-//! come in order by construction, and a stroke that never pauses is shown all along.
+//! A group is meshed from one snapshot of the samples, and all its chunks are swapped at once. So there is never a
+//! crack between a chunk that shows an edit and one that does not yet. While a group is being meshed, its chunks are
+//! claimed. Edits of claimed chunks wait, become one set, and start from the newest samples when the group is done. So
+//! results arrive in order by construction, and a stroke that never pauses is shown while it goes on.
 //!
-//! A chunk that has never been drawn is a group of its own, which gives way to edits.
+//! A chunk that has never been drawn is a group of its own, and gives way to edits.
 
 mod job;
 mod pool;
@@ -38,11 +38,11 @@ use crate::volume::{
     ChunkMesh, Colors, DrawnMesh, Heart, MeshResult, PreparedGroup, Restyle, Restyled, ShowTarget, Shown, Swap,
 };
 
-/// The number of a vertex's material, a `u32`, for shaders.
+/// The vertex attribute with a vertex's material, a `u32`, for shaders.
 pub const ATTRIBUTE_MATERIAL: MeshVertexAttribute =
     MeshVertexAttribute::new("Marchless_Material", 0x4d61_7263_686c_6573, VertexFormat::Uint32);
 
-/// Meshes terrains and hand-made chunks.
+/// Meshes the chunks of terrains, and standalone [`ChunkSamples`].
 #[derive(Default)]
 pub struct MeshingPlugin;
 
@@ -57,10 +57,11 @@ impl Plugin for MeshingPlugin {
     }
 }
 
-/// At most this many chunks are meshed within one update for its edits.
+/// The number of chunks that one update may mesh inline for its edits, unless
+/// [`MarchlessSettings::max_inline_chunks`] is higher.
 const MOST_INLINE: usize = 1024;
 
-/// What showing a mesh takes.
+/// The system parameters that spawning and updating chunk entities need.
 #[derive(SystemParam)]
 struct MeshPresenter<'w, 's> {
     commands: Commands<'w, 's>,
@@ -71,13 +72,13 @@ struct MeshPresenter<'w, 's> {
 }
 
 impl MeshPresenter<'_, '_> {
-    /// What the assets of meshes in these colours are like; `None` where there are no assets.
+    /// The style of mesh assets in these colours; `None` in an app without mesh assets.
     fn style(&self, colors: &Colors) -> Option<AssetStyle> {
         let usages = self.settings.mesh_usages;
         self.assets.is_some().then(|| AssetStyle { colors: colors.clone(), usages })
     }
 
-    /// Gives an entity its new mesh, which may be empty. `cells`: the chunk's size, whose box bounds an empty mesh.
+    /// Gives an entity its new mesh, which may be empty. `cells`: the chunk's size; its box bounds an empty mesh.
     fn show(&mut self, entity: Entity, meshed: ChunkMesh, cells: [u32; 3]) {
         let bounds = mesh_bounds(&meshed.geometry, cells);
         let mut entity = self.commands.entity(entity);
@@ -88,14 +89,14 @@ impl MeshPresenter<'_, '_> {
         };
     }
 
-    /// Gives an entity another asset of the mesh that it has.
+    /// Replaces the asset of an entity's mesh, not its geometry.
     fn show_asset(&mut self, entity: Entity, mesh: Mesh) {
         if let Some(assets) = &mut self.assets {
             self.commands.entity(entity).try_insert(Mesh3d(assets.add(mesh)));
         }
     }
 
-    /// Spawns a chunk with its mesh, which is not empty.
+    /// Spawns a chunk with its mesh, which must not be empty.
     fn spawn(&mut self, chunk: impl Bundle, meshed: ChunkMesh, cells: [u32; 3]) -> Entity {
         let bounds = mesh_bounds(&meshed.geometry, cells);
         let mut entity = self.commands.spawn((chunk, ChunkGeometry { mesh: meshed.geometry }, bounds));
@@ -106,7 +107,7 @@ impl MeshPresenter<'_, '_> {
     }
 }
 
-/// Shows the groups that are complete, and starts new ones.
+/// Shows complete groups, and starts new ones.
 fn mesh_terrains(
     mut volumes: Query<(Entity, &mut TerrainVolume)>,
     queue: Res<WorkQueue>,
@@ -140,7 +141,7 @@ fn mesh_terrains(
     budget.spend_on_edits(edits);
 }
 
-/// How many bytes a mesh takes, in memory and, or about so, on the graphics card.
+/// The size of a mesh in bytes, in memory and approximately on the graphics card.
 pub(crate) fn geometry_bytes(mesh: &MeshBuffer) -> usize {
     size_of_val(&mesh.positions[..])
         + size_of_val(&mesh.normals[..])
@@ -148,24 +149,26 @@ pub(crate) fn geometry_bytes(mesh: &MeshBuffer) -> usize {
         + size_of_val(&mesh.indices[..])
 }
 
-/// Meshing and showing, in one update.
+/// The budgets and counters of one update's meshing and showing.
 struct MeshUpdate<'a, 'w, 's> {
     queue: &'a WorkQueue,
     presenter: &'a mut MeshPresenter<'w, 's>,
+    /// The end of the time budget; time spent on edits extends it.
     until: Instant,
-    /// At most this many chunks of a terrain are meshed at once that give way to edits.
+    /// The most chunks of one terrain whose low-priority jobs, which give way to edits, may be in flight.
     in_flight: usize,
-    /// Groups of at most this many chunks are meshed at once, and this many chunks in all.
+    /// The largest group that is meshed within the update. [Units: chunks]
     inline: usize,
+    /// The chunks that may still be meshed within this update.
     inline_left: usize,
     max_upload_bytes: usize,
-    /// So much has been taken from jobs.
+    /// The bytes of all meshes taken from jobs in this update.
     bytes: usize,
-    /// What edits have taken, which is not at the cost of others.
+    /// The time spent on edits, which does not count against the budget of other work.
     edits: Duration,
 }
 
-/// One terrain.
+/// The terrain that is being meshed and shown.
 struct Drawing<'a> {
     terrain: Entity,
     voxel_size: f32,
@@ -173,7 +176,7 @@ struct Drawing<'a> {
 }
 
 impl MeshUpdate<'_, '_, '_> {
-    /// Everything for one terrain.
+    /// Does all meshing and showing of one terrain.
     fn mesh(&mut self, drawing: &mut Drawing) {
         self.take_results(drawing);
         let start = Instant::now();
@@ -188,7 +191,7 @@ impl MeshUpdate<'_, '_, '_> {
         self.transition(drawing);
     }
 
-    /// Takes what jobs have meshed, and shows the groups that are complete.
+    /// Takes finished meshes from jobs, and shows the groups that are complete.
     fn take_results(&mut self, drawing: &mut Drawing) {
         loop {
             let bytes = Cell::new(self.bytes);
@@ -206,7 +209,7 @@ impl MeshUpdate<'_, '_, '_> {
             self.bytes = bytes.get();
             let Some(group) = complete else { break };
             if group.gives_way() {
-                // What commands do later takes its time, too.
+                // Reserve time for the commands that run later.
                 self.until = self.until.checked_sub(ENTITY_TIME).unwrap_or(self.until);
             }
             let shown = drawing.heart.show(group);
@@ -214,7 +217,7 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
-    /// Starts the most urgent chunks that are to be meshed for the first time, one by one.
+    /// Starts the first meshes of chunks, one by one, the most urgent first.
     fn first_meshes(&mut self, drawing: &mut Drawing) {
         let mut done = 0;
         while (done % 2 != 0 || done == 0 || Instant::now() < self.until)
@@ -225,7 +228,7 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
-    /// Gives chunks another look, one by one.
+    /// Starts meshing or colouring chunks again after a change of normals or colours, one by one.
     fn restyle(&mut self, drawing: &mut Drawing) {
         let style = self.presenter.style(drawing.heart.colors());
         let mut done = 0;
@@ -247,7 +250,7 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
-    /// Lets the change to another isovalue go on, and end.
+    /// Continues the change to another isovalue, and ends it if it may end.
     fn transition(&mut self, drawing: &mut Drawing) {
         if drawing.heart.may_end_transition(self.inline) {
             self.end_transition(drawing);
@@ -268,7 +271,7 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
-    /// Meshes what is missing for the other isovalue, and shows it.
+    /// Meshes the chunks that are still missing at the new isovalue, and shows all of them.
     fn end_transition(&mut self, drawing: &mut Drawing) {
         let style = self.presenter.style(drawing.heart.colors());
         while let Some((key, _, settings)) = drawing.heart.next_in_transition(usize::MAX) {
@@ -284,7 +287,7 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
-    /// Starts a group: shows it at once, where that is quick, or asks for its meshes.
+    /// Starts a group: meshes and shows a small one within this update, or starts jobs for a larger one.
     fn start(&mut self, drawing: &mut Drawing, prepared: PreparedGroup) {
         let count = prepared.to_mesh.len();
         if count > self.inline.min(self.inline_left) {
@@ -308,7 +311,7 @@ impl MeshUpdate<'_, '_, '_> {
         self.show(drawing, shown);
     }
 
-    /// Asks for the meshes of a group; shows it, if there are none to be made.
+    /// Starts the jobs of a group; a group with nothing to mesh is shown at once.
     fn start_jobs(&mut self, drawing: &mut Drawing, prepared: PreparedGroup, priority: Priority) {
         if prepared.to_mesh.is_empty() {
             let shown = drawing.heart.show(prepared.group);
@@ -326,6 +329,7 @@ impl MeshUpdate<'_, '_, '_> {
         });
     }
 
+    /// Carries out a group's swaps on its chunks' entities.
     fn show(&mut self, drawing: &mut Drawing, shown: Shown) {
         let cells = [drawing.heart.samples().shown().chunk_cells(); 3];
         for swap in shown.swaps {

@@ -1,4 +1,4 @@
-//! [`TerrainQuery`]: what a ray hits, how far away the surface is.
+//! [`TerrainQuery`]: ray casts, distances to the surface, and conversions between world and lattice.
 
 mod bounds;
 mod transforms;
@@ -17,8 +17,8 @@ use crate::placement::{Placement, PlacementItem};
 use crate::terrain::{TerrainVolume, give_to_terrains};
 use visibility::IsHidden;
 
-/// Registers the types of answers, notes which terrains are hidden, and lets terrains be where their `Transform` says in
-/// apps without `TransformPlugin`.
+/// Supports [`TerrainQuery`]: registers its types, records which terrains are hidden, and updates terrains'
+/// `GlobalTransform` in apps without `TransformPlugin`.
 #[derive(Default)]
 pub struct QueryPlugin;
 
@@ -31,12 +31,14 @@ impl Plugin for QueryPlugin {
     }
 }
 
-/// Questions to all terrains, in world space.
+/// A system parameter with spatial queries about all terrains, in world space.
 ///
-/// Terrains are where they were when transforms were last propagated, and rays hit what is drawn, not what is about to be.
-/// Only where the extent has just changed, walls and chunks that are about to go may be drawn for some updates and not be hit.
-/// Where nobody propagates transforms, as with Bevy's `MinimalPlugins` alone, the plugin itself does it at the end of
-/// `PostUpdate`, for the entities of terrains only.
+/// Queries use the transforms as last propagated. Rays hit the meshes that are drawn, not those of pending edits. There
+/// is one exception: after a change of the extent, walls and chunks that are about to go may be drawn for some updates
+/// and not be hit.
+///
+/// In an app that does not propagate transforms, such as one with only Bevy's `MinimalPlugins`, the plugin updates the
+/// `GlobalTransform` of terrains itself, at the end of `PostUpdate`. It does so for no other entities.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;
@@ -56,7 +58,7 @@ pub struct TerrainQuery<'w, 's> {
     hidden: Query<'w, 's, &'static IsHidden>,
 }
 
-/// Where a ray hits a terrain.
+/// The point where a ray hits a terrain.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 pub struct TerrainHit {
@@ -64,27 +66,29 @@ pub struct TerrainHit {
     pub terrain: Entity,
     /// The entity of the chunk whose triangle was hit.
     pub chunk: Entity,
-    /// Where, in world space.
+    /// The position of the hit in world space.
     pub position: Vec3,
-    /// The triangle's unit normal in world space, to the outside.
+    /// The triangle's unit normal in world space, pointing outside.
     pub normal: Vec3,
-    /// Where, in voxels from the terrain's lowest corner, as stamps want it.
+    /// The position of the hit in the terrain's lattice, as stamps take it. [Units: voxels from the lowest corner]
     pub lattice: DVec3,
-    /// What the nearest corner of the triangle is made of.
+    /// The material at the nearest corner of the triangle.
     pub material: u8,
-    /// How far from the ray's origin, in world units.
+    /// The distance from the ray's origin. [Units: world]
     pub distance: f32,
 }
 
 impl TerrainQuery<'_, '_> {
-    /// The first triangle that a ray hits, of any [visible](Self::is_visible) terrain and from either side.
+    /// The first triangle of any [visible](Self::is_visible) terrain that a ray hits, from either side.
+    ///
     /// `max_distance`: in world units.
     pub fn ray_cast(&self, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
         self.ray_cast_where(ray, max_distance, |terrain| self.is_visible(terrain))
     }
 
-    /// The first triangle that a ray hits, of the terrains that `filter` accepts, hidden ones too. The filter is called only
-    /// for terrains near the ray.
+    /// The first triangle that a ray hits among the terrains that `filter` accepts, hidden ones included.
+    ///
+    /// `max_distance`: in world units. The filter is called only for terrains near the ray.
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
@@ -93,7 +97,7 @@ impl TerrainQuery<'_, '_> {
     ///
     /// # #[derive(Component)]
     /// # struct Water;
-    /// /// What a ray hits below the water.
+    /// /// Finds the ground below the water.
     /// fn look_through_water(ray: Ray3d, terrains: &TerrainQuery, water: &Query<(), With<Water>>) -> Option<TerrainHit> {
     ///     let is_ground = |terrain| terrains.is_visible(terrain) && !water.contains(terrain);
     ///     terrains.ray_cast_where(ray, 500.0, is_ground)
@@ -113,22 +117,22 @@ impl TerrainQuery<'_, '_> {
         cast(self.terrains.get(terrain).ok()?, ray, max_distance)
     }
 
-    /// Whether a terrain's `Visibility`, its own or the inherited one, let it be drawn in the latest update. True where it
-    /// has none.
+    /// True if a terrain's own or inherited `Visibility` let it be drawn in the latest update, or if it has none.
     ///
-    /// It needs no renderer. The visibility of single chunks does not count.
+    /// This needs no renderer. The visibility of single chunks does not count.
     pub fn is_visible(&self, terrain: Entity) -> bool {
         !self.hidden.get(terrain).is_ok_and(|is_hidden| is_hidden.0)
     }
 
-    /// How far a position in world space is from the surface, in voxels, negative inside, with all edits; interpolated
-    /// between samples.
+    /// The signed distance from a position in world space to the surface, negative inside, with all edits; interpolated
+    /// between samples. [Units: voxels]
     ///
-    /// `None` where there is no such terrain, or a chunk with samples around it is not filled yet. Outside of the terrain's extent is air.
+    /// `None` if there is no such terrain, or if a chunk that holds the samples around the position is not filled yet.
+    /// Outside the terrain's extent is air.
     pub fn weight_at(&self, terrain: Entity, position: Vec3) -> Option<f32> {
         let (_, volume, _) = self.terrains.get(terrain).ok()?;
         let lattice = self.to_lattice(terrain, position)?;
-        // The samples between which it lies may be in up to eight chunks.
+        // The eight samples around the position may be in up to eight chunks.
         let corner = lattice.floor().as_ivec3();
         let ends = [corner, corner.saturating_add(IVec3::ONE)];
         let [low, high] = ends.map(|end| volume.grid().chunk_of(end.to_array()));
@@ -139,7 +143,9 @@ impl TerrainQuery<'_, '_> {
         marchless::weight_at(volume.grid(), volume.settings()?.isovalue, lattice.to_array())
     }
 
-    /// A position in world space in voxels from the terrain's lowest corner, as stamps want it.
+    /// Converts a position from world space to the terrain's lattice: voxels from its lowest corner, as stamps take it.
+    ///
+    /// `None` if there is no such terrain or the result is not finite.
     pub fn to_lattice(&self, terrain: Entity, position: Vec3) -> Option<DVec3> {
         let (_, volume, place) = self.terrains.get(terrain).ok()?;
         let local = place.to_terrain().transform_point3(position.as_dvec3());
@@ -147,23 +153,26 @@ impl TerrainQuery<'_, '_> {
         lattice.is_finite().then_some(lattice)
     }
 
-    /// A position in voxels from the terrain's lowest corner, in world space.
+    /// Converts a position from the terrain's lattice, in voxels from its lowest corner, to world space.
+    ///
+    /// `None` if there is no such terrain.
     pub fn to_world(&self, terrain: Entity, lattice: impl Into<DVec3>) -> Option<Vec3> {
         let (_, volume, place) = self.terrains.get(terrain).ok()?;
         let local = lattice.into() * f64::from(volume.settings()?.voxel_size);
         Some(place.to_world().transform_point3(local).as_vec3())
     }
 
-    /// A length in world units in voxels of the terrain, as brushes want it.
+    /// Converts a length from world units to voxels of the terrain, as brushes take it.
     ///
-    /// Where the terrain's transform scales its axes differently, the scale is the cube root of the determinant: the factor
-    /// by which volumes grow. `None` where there is no such terrain, where it is scaled to nothing, or where a number is not finite.
+    /// If the terrain's transform scales its axes differently, the scale is the cube root of the determinant, which is
+    /// the factor by which volumes grow. `None` if there is no such terrain, if it is scaled to nothing, or if a number
+    /// is not finite.
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
     /// # use bevy_math::Vec3;
     ///
-    /// /// Digs a ball of 2 world units, however large voxels are.
+    /// /// Digs a ball with a radius of 2 world units, whatever the size of a voxel.
     /// fn dig(at: Vec3, hit: &TerrainHit, terrains: &TerrainQuery) -> Option<Stamp> {
     ///     let middle = terrains.to_lattice(hit.terrain, at)?;
     ///     let radius = terrains.to_lattice_length(hit.terrain, 2.0)?;
@@ -175,12 +184,13 @@ impl TerrainQuery<'_, '_> {
         length.is_finite().then_some(length)
     }
 
-    /// A length in voxels of the terrain in world units: the inverse of [`to_lattice_length`](Self::to_lattice_length).
+    /// Converts a length from voxels of the terrain to world units: the inverse of
+    /// [`to_lattice_length`](Self::to_lattice_length).
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
     ///
-    /// /// How far the surface is, in world units.
+    /// /// The distance to the surface, in world units.
     /// fn height(hit: &TerrainHit, at: bevy_math::Vec3, terrains: &TerrainQuery) -> Option<f32> {
     ///     terrains.to_world_length(hit.terrain, terrains.weight_at(hit.terrain, at)?)
     /// }
@@ -199,12 +209,13 @@ impl TerrainQuery<'_, '_> {
     }
 }
 
-/// Whether the samples of a chunk of the terrain's extent are not there: it is not filled yet, not loaded, or they were dropped.
+/// True if a chunk in the terrain's extent has no samples: they are not filled yet, not loaded, or were dropped.
 fn is_unfilled(volume: &TerrainVolume, chunk: [i32; 3]) -> bool {
     let is_there = volume.grid().chunk(chunk).is_some();
     !is_there && volume.grid().bounds().is_none_or(|bounds| bounds.contains(chunk))
 }
 
+/// The first drawn triangle of one terrain that a ray hits.
 fn cast(
     (terrain, volume, place): (Entity, &TerrainVolume, PlacementItem),
     ray: Ray3d,
@@ -224,7 +235,7 @@ fn cast(
         let (shown, isovalue) = (volume.shown(), volume.shown_isovalue());
         let hit = marchless::ray_cast(shown, isovalue, from.to_array(), direction.to_array(), reach - start)?;
         let Some(chunk) = volume.heart().entity(ChunkKey::finest(hit.chunk)) else {
-            // The samples of a chunk that is not drawn yet, known for the sake of its neighbours: on behind them.
+            // This chunk is not drawn yet; its samples serve its neighbours. Continue behind the hit.
             start += hit.distance + 1e-3;
             continue;
         };

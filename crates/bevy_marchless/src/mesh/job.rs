@@ -1,4 +1,4 @@
-//! Meshing chunks, on any thread.
+//! Functions that mesh chunks, on any thread.
 
 use core::cell::RefCell;
 use core::iter;
@@ -16,17 +16,19 @@ use super::ATTRIBUTE_MATERIAL;
 use super::pool::{MeshPool, PooledAsset, PooledMesh};
 use crate::volume::{ChunkMesh, Colors};
 
-/// What the asset of a mesh is like.
+/// The style of a mesh asset.
 #[derive(Clone)]
 pub(crate) struct AssetStyle {
     /// The colours of its vertices.
     pub(crate) colors: Colors,
-    /// Where it is kept.
+    /// The worlds that keep it: main, render or both.
     pub(crate) usages: RenderAssetUsages,
 }
 
-/// Meshes a chunk. `style`: of its asset; `None` where none is wanted. `pool`: memory for the mesh; without it,
-/// the mesh takes no more than it needs.
+/// Meshes a chunk.
+///
+/// `style`: of its asset; with `None` no asset is made. `pool`: memory for the mesh; without it, memory of exactly the
+/// mesh's size is allocated.
 pub(crate) fn mesh_chunk(
     samples: &NeighbourhoodView<'_>,
     position: [i32; 3],
@@ -37,7 +39,7 @@ pub(crate) fn mesh_chunk(
     mesh_with(position, style, pool, |mesher, block, out| samples.mesh(mesher, block, settings, out))
 }
 
-/// Meshes chunks at once, with the help of the compute pool where there is one; the result is in the order of positions.
+/// Meshes chunks and waits for them, with the help of the compute pool if there is one. Meshes are sorted by position.
 pub(crate) fn mesh_now(
     chunks: &[([i32; 3], NeighbourhoodView<'_>)],
     settings: &MeshSettings,
@@ -45,7 +47,7 @@ pub(crate) fn mesh_now(
     pool: &MeshPool,
 ) -> Vec<ChunkMesh> {
     let next = AtomicUsize::new(0);
-    // Each thread takes the next one when it is free: to wake others for each would take longer.
+    // Each thread takes the next chunk when it is free. Waking a thread for each chunk would take longer.
     let take = || {
         let (position, samples) = chunks.get(next.fetch_add(1, Ordering::Relaxed))?;
         Some(mesh_chunk(samples, *position, settings, style, Some(pool)))
@@ -65,15 +67,15 @@ pub(crate) fn mesh_now(
     meshed
 }
 
-/// The same mesh in other colours.
+/// Makes a new asset of a mesh, in the colours of `style`.
 pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, style: Option<&AssetStyle>) -> ChunkMesh {
     let start = Instant::now();
     let mesh = style.map(|style| to_asset(&geometry, style, PooledAsset::default()));
     ChunkMesh { position, geometry, mesh, time: start.elapsed() }
 }
 
-/// Runs `mesh` with this thread's scratch memory, and makes an asset of what comes out. A failure is reported and
-/// leaves nothing to draw.
+/// Runs `mesh` with this thread's scratch memory, and makes an asset of the result. An error is logged, and gives an
+/// empty mesh.
 pub(super) fn mesh_with(
     position: [i32; 3],
     style: Option<&AssetStyle>,
@@ -85,7 +87,7 @@ pub(super) fn mesh_with(
             RefCell::new((Mesher::new(), Block::new(), MeshBuffer::new()));
     }
     let start = Instant::now();
-    // A copy takes no more memory than the mesh needs, or than its pooled has; a buffer that has grown does.
+    // Copy the mesh: scratch buffers only grow, while the copy takes the memory that it needs or that the pool gave it.
     let pooled = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
         Ok(()) => {
             let mut pooled = pool.map_or_else(PooledMesh::default, |pool| pool.take_for(geometry));
@@ -112,8 +114,8 @@ fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {
     to.bounds = *bounds;
 }
 
-/// A mesh as an asset: positions in voxels, colours and materials a vertex, and the indices, in half the bytes
-/// where there are few enough vertices.
+/// Makes a mesh asset: positions in voxels, normals, colours and materials per vertex, and indices. The indices are
+/// 16-bit if there are few enough vertices, else 32-bit.
 fn to_asset(geometry: &MeshBuffer, style: &AssetStyle, pooled: PooledAsset) -> Mesh {
     let MeshBuffer { positions, normals, materials, indices, bounds } = geometry;
     let indices = if positions.len() <= usize::from(u16::MAX) {
@@ -136,7 +138,7 @@ fn to_asset(geometry: &MeshBuffer, style: &AssetStyle, pooled: PooledAsset) -> M
     mesh
 }
 
-/// The items, in a pooled that is empty.
+/// Fills an empty pooled vector with `items`.
 fn filled<T>(mut pooled: Vec<T>, items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
     pooled.reserve_exact(items.len());
     pooled.extend(items);

@@ -1,4 +1,4 @@
-//! [`MeshPool`]: memory for the meshes that edits show at once.
+//! [`MeshPool`]: prepared memory for the meshes that edits show at once.
 
 use core::hint::black_box;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,21 +7,22 @@ use bevy_ecs::prelude::*;
 use bevy_tasks::AsyncComputeTaskPool;
 use marchless::MeshBuffer;
 
-/// Memory that tasks have prepared for the meshes that edits show at once: new memory has to be mapped page by page when
-/// it is first written to, which can take longer than all else. At most 7 MB.
+/// Memory that tasks have prepared for the meshes that edits show at once. At most 7 MB.
+///
+/// The system maps new memory page by page on the first write, which can take longer than all other work of an edit.
 #[derive(Resource, Clone, Default)]
 pub(crate) struct MeshPool(Arc<Mutex<[Vec<PooledMesh>; SIZES]>>);
 
-/// The vertices of a mesh for which the smallest pool are, each size being twice the one before.
+/// The vertices that the smallest size holds; each further size holds twice as many.
 const SMALLEST: usize = 256;
-/// Larger meshes are rare, and take long anyway.
+/// The number of sizes. Larger meshes are rare, and take long anyway.
 const SIZES: usize = 5;
-/// So many of each size: what a small edit may take.
+/// The number of meshes that are prepared of each size: as many as a small edit may take.
 const OF_EACH: usize = 8;
-/// Three for each triangle, of which a closed surface has two for each vertex.
+/// A closed surface has two triangles per vertex, with three indices each.
 const INDICES_PER_VERTEX: usize = 6;
 
-/// Memory for a chunk's mesh and its asset. What is not there is allocated when it is needed.
+/// Memory for a chunk's mesh and its asset. Vectors without prepared memory allocate it when needed.
 #[derive(Debug, Default)]
 pub(crate) struct PooledMesh {
     pub(crate) geometry: MeshBuffer,
@@ -39,7 +40,7 @@ pub(crate) struct PooledAsset {
 }
 
 impl MeshPool {
-    /// A pooled in which a mesh fits, at most four times as large as needed; or an empty one, where none is prepared.
+    /// Takes memory in which a mesh fits, at most four times as large as needed. It is empty if none is prepared.
     pub(crate) fn take_for(&self, mesh: &MeshBuffer) -> PooledMesh {
         let least = size(mesh);
         let mut pool = self.lock();
@@ -47,8 +48,8 @@ impl MeshPool {
         if mesh.is_empty() { None } else { fitting.next() }.unwrap_or_default()
     }
 
-    /// Has a task prepare what is missing for meshes up to the size of the largest of these; `assets`: for their assets
-    /// too. Without threads for it, nothing is prepared.
+    /// Starts a task that fills the pool up, for meshes up to the size of the largest of these. `assets`: whether to
+    /// prepare memory for their assets, too. Without a task pool, nothing is prepared.
     pub(crate) fn prepare<'a>(&self, meshes: impl Iterator<Item = &'a MeshBuffer>, assets: bool) {
         let Some(largest) = meshes.filter(|mesh| !mesh.is_empty()).max_by_key(|mesh| size(mesh)) else { return };
         let last = size(largest).min(SIZES - 1);
@@ -73,14 +74,14 @@ impl MeshPool {
     }
 }
 
-/// The index of the smallest pool in which a mesh fits; it may be out of range.
+/// The index of the smallest size in which a mesh fits; it may be out of range.
 fn size(mesh: &MeshBuffer) -> usize {
     let vertices = mesh.positions.len().max(mesh.indices.len().div_ceil(INDICES_PER_VERTEX));
     vertices.div_ceil(SMALLEST).next_power_of_two().ilog2() as usize
 }
 
 impl PooledMesh {
-    /// Room for so many vertices, all of which has been written to.
+    /// Allocates memory for `vertices` vertices, and writes to all of it.
     fn new(vertices: usize, normals: bool, materials: bool, assets: bool) -> Self {
         let indices = INDICES_PER_VERTEX * vertices;
         let geometry = MeshBuffer {
@@ -101,12 +102,12 @@ impl PooledMesh {
     }
 }
 
-/// An empty vector with pooled for so many items that has been written to, or without pooled where none is wanted.
+/// An empty vector with memory for `items` items that has been written to, or without memory if none is `wanted`.
 fn written<T: Copy + Default>(items: usize, wanted: bool) -> Vec<T> {
     let mut pooled = Vec::new();
     if wanted {
         pooled.reserve_exact(items);
-        // Nobody is to know that the items are zeros, for those could be had without writing.
+        // Hide from the compiler that the items are zeros: zeroed memory would not be written to.
         pooled.resize(items, black_box(T::default()));
         pooled.clear();
     }
@@ -142,7 +143,7 @@ mod tests {
         ]
     }
 
-    /// Prepares pool, and waits until there are this many of each size.
+    /// Prepares the pool, and waits until it holds this many of each size.
     fn prepare(pool: &MeshPool, meshes: &[MeshBuffer], assets: bool, there: [usize; SIZES]) {
         AsyncComputeTaskPool::get_or_init(Default::default);
         pool.prepare(meshes.iter(), assets);
@@ -152,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn rooms_are_prepared_up_to_the_size_of_the_largest_mesh() {
+    fn memory_is_prepared_up_to_the_size_of_the_largest_mesh() {
         let pool = MeshPool::default();
         assert_eq!(capacities(&pool.take_for(&mesh(100))), [0; 9], "nothing is prepared");
         prepare(&pool, &[mesh(10), mesh(300), mesh(1), mesh(0)], true, [8, 8, 0, 0, 0]);

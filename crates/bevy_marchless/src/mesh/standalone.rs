@@ -1,4 +1,4 @@
-//! [`ChunkSamples`]: samples of the game's own on any entity, and their mesh.
+//! [`ChunkSamples`]: standalone chunks, whose samples the game provides on any entity.
 
 use std::sync::Arc;
 
@@ -20,11 +20,11 @@ use crate::jobs::{Priority, Results, Ticket, WorkQueue};
 use crate::terrain::Palette;
 use crate::volume::ChunkMesh;
 
-/// Samples of your own: insert them on any entity, and their mesh appears, and again after each change.
+/// A standalone chunk: samples that you insert on any entity. The plugin meshes them, and again after each change.
 ///
-/// The mesh is in voxels from the first sample; the entity's `Transform` is yours, and so is its material: without any it gets
-/// a plain one (feature `pbr`). It stays open where the surface
-/// meets the samples' border, and takes no stamps.
+/// The mesh is in voxels from the first sample. The entity's `Transform` and its material are yours; an entity without
+/// a material gets a plain one (feature `pbr`). The mesh stays open where the surface meets the samples' border. A
+/// standalone chunk takes no stamps.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;
@@ -44,15 +44,15 @@ use crate::volume::ChunkMesh;
 #[require(ChunkGeometry, Transform, Visibility, NoAutoAabb, MeshingState)]
 pub struct ChunkSamples {
     data: SharedSamples,
-    /// The surface lies where the weight equals this many voxels; finite. Default 0.
+    /// The surface lies where the weight equals this. [Limit: finite] [Units: voxels] Default: 0.
     pub isovalue: f32,
-    /// Whether the mesh has normals. Default true.
+    /// Whether the mesh has normals. Default: true.
     pub normals: bool,
     /// The colours of the materials.
     pub palette: Palette,
 }
 
-/// What the samples are, shared with the jobs that mesh them.
+/// The samples, shared with the jobs that mesh them.
 #[derive(Reflect, Clone, Debug)]
 #[reflect(opaque)]
 #[reflect(Default, Debug, Clone)]
@@ -63,7 +63,7 @@ struct SharedSamples(Arc<Data>);
 struct Data {
     shape: Shape,
     weights: Vec<i16>,
-    /// None, or one a sample.
+    /// Empty, or one per sample.
     materials: Vec<u8>,
 }
 
@@ -81,14 +81,14 @@ impl SharedSamples {
     }
 }
 
-/// Air.
+/// Air, of 2 × 2 × 2 samples.
 impl Default for SharedSamples {
     fn default() -> Self {
         Self::new(UVec3::splat(2), vec![i16::MAX; 8], Vec::new()).expect("8 weights of 2 × 2 × 2 samples")
     }
 }
 
-/// Samples as they are written: shape, weights and materials.
+/// The serialized form of samples: shape, weights and materials.
 #[cfg(feature = "serde")]
 type SerializedSamples = (UVec3, Vec<i16>, Vec<u8>);
 
@@ -109,15 +109,19 @@ impl<'de> serde::Deserialize<'de> for SharedSamples {
 }
 
 impl ChunkSamples {
+    /// A standalone chunk of `shape` samples per axis, all of material 0.
+    ///
     /// `weights`: signed distances in 1/256 voxel, negative inside; `[x·y·z]` of `shape`, x fastest.
     ///
     /// # Errors
-    /// [`ChunkSamplesError`] where an axis has fewer than 2 samples or the length is not the shape's.
+    /// [`ChunkSamplesError`] if an axis has fewer than 2 samples or the length is not the shape's.
     pub fn new(shape: UVec3, weights: Vec<i16>) -> Result<Self, ChunkSamplesError> {
         Ok(Self { data: SharedSamples::new(shape, weights, Vec::new())?, ..Self::default() })
     }
 
-    /// The same from signed distances in voxels, rounded to 1/256 and saturated at ±128 voxels.
+    /// A standalone chunk from signed distances in voxels, rounded to 1/256 and saturated at ±128 voxels.
+    ///
+    /// `distances`: `[x·y·z]` of `shape`, x fastest.
     ///
     /// # Errors
     /// As [`ChunkSamples::new`].
@@ -125,10 +129,10 @@ impl ChunkSamples {
         Self::new(shape, distances.iter().map(|&distance| i16::from_voxels(distance)).collect())
     }
 
-    /// The same samples, made of `materials`, one a sample. Without them all is material 0.
+    /// Gives each sample its material from `materials`, x fastest. Without them, all samples have material 0.
     ///
     /// # Errors
-    /// [`ChunkSamplesError::Samples`] where the length is not the shape's.
+    /// [`ChunkSamplesError::Samples`] if the length is not the shape's.
     pub fn with_materials(self, materials: Vec<u8>) -> Result<Self, ChunkSamplesError> {
         let data = &self.data.0;
         Samples::new(data.shape, &data.weights)?.with_materials(&materials)?;
@@ -146,12 +150,12 @@ impl ChunkSamples {
         &self.data.0.weights
     }
 
-    /// The materials, x fastest; empty where there are none.
+    /// The materials, x fastest; empty if none were given.
     pub fn materials(&self) -> &[u8] {
         &self.data.0.materials
     }
 
-    /// The job that meshes the samples as they are now.
+    /// A job that meshes the current samples.
     fn mesh_job(&self, presenter: &MeshPresenter) -> impl FnOnce() -> ChunkMesh + Send + 'static {
         let SharedSamples(data) = self.data.clone();
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
@@ -179,36 +183,36 @@ impl Default for ChunkSamples {
     }
 }
 
-/// Why something is not [`ChunkSamples`].
+/// An error in the shape or length of [`ChunkSamples`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ChunkSamplesError {
-    /// There is no cell.
+    /// An axis has fewer than two samples, so there is no cell.
     #[error("a chunk needs at least 2 samples per axis, but there are {found}")]
     TooSmall {
-        /// What was given.
+        /// The shape that was given.
         found: UVec3,
     },
     /// There are too many samples.
     #[error(transparent)]
     Shape(#[from] ShapeError),
-    /// A length is not the shape's.
+    /// The number of weights or materials is not the shape's.
     #[error(transparent)]
     Samples(#[from] SamplesError),
 }
 
-/// What is being done with an entity's samples.
+/// The meshing state of an entity's samples.
 #[derive(Component, Default)]
 pub(super) struct MeshingState {
-    /// When the samples that were looked at last had been changed: so no change is missed while the entity is disabled.
+    /// The change tick of the samples that were seen last. With it, no change is missed while the entity is disabled.
     seen: Option<Tick>,
-    /// Whether these samples are still to be meshed.
+    /// Whether the seen samples still have to be meshed.
     changed: bool,
-    /// The job that meshes an earlier state, and where it leaves the mesh; that is shown, and the newest comes next.
+    /// The job that meshes earlier samples, and its result. The result is shown before the newest samples are meshed.
     job: Option<(Ticket, Results<ChunkMesh>)>,
 }
 
-/// Meshes changed samples: small ones at once, others in jobs, one at a time for each entity.
+/// Meshes changed samples: small chunks at once, others in jobs, one at a time for each entity.
 pub(super) fn mesh_samples(
     mut chunks: Query<(Entity, Ref<ChunkSamples>, &mut MeshingState)>,
     queue: Res<WorkQueue>,
@@ -247,7 +251,7 @@ fn show(entity: Entity, samples: &ChunkSamples, meshed: ChunkMesh, presenter: &m
     presenter.show(entity, meshed, (samples.shape() - 1).to_array());
 }
 
-/// Without samples there is nothing to draw.
+/// Removes the mesh of an entity that loses its samples.
 pub(super) fn forget_removed_samples(removed: On<Remove, ChunkSamples>, mut commands: Commands) {
     commands.entity(removed.entity).try_remove::<(Mesh3d, ChunkGeometry, Aabb, NoAutoAabb, MeshingState)>();
 }

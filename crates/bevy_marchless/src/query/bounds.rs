@@ -1,11 +1,12 @@
-//! Which terrains a ray may hit, at the cost of a few products each.
+//! A cheap test of which terrains a ray may hit: a few products per terrain.
 
 use bevy_math::{DAffine3, DVec3, IVec3, Ray3d};
 
 use crate::placement::PlacementItem;
 use crate::terrain::TerrainVolume;
 
-/// Whether a ray may hit a terrain. Never false where it does; true for endless terrains, whose boxes are huge.
+/// True if a ray may hit a terrain. Never false for a terrain that it hits; true for endless ones, whose boxes are
+/// huge.
 pub(super) fn may_hit(volume: &TerrainVolume, place: &PlacementItem, ray: Ray3d, max_distance: f32) -> bool {
     let Some(settings) = volume.settings() else { return false };
     let Some(planes) = volume.shown().planes() else { return true };
@@ -14,15 +15,15 @@ pub(super) fn may_hit(volume: &TerrainVolume, place: &PlacementItem, ray: Ray3d,
     may_hit_box(ray, max_distance, &place.to_world(), corners)
 }
 
-/// Whether a ray comes near the sphere around a box. `corners`: the lowest and the highest.
+/// True if a ray comes near the bounding sphere of a box, given by its lowest and its highest corner.
 ///
-/// The sphere is found in world space, for which a terrain's transform need not be inverted: its middle is that of the
-/// box, and it reaches to the farthest corner. Where a number is not finite, either answer will do: nothing is hit.
+/// The sphere is computed in world space, so the terrain's transform need not be inverted. Its centre is the box's
+/// centre, its radius reaches the farthest corner. If a number is not finite, either result is correct: nothing is hit.
 fn may_hit_box(ray: Ray3d, max_distance: f32, to_world: &DAffine3, [min, max]: [DVec3; 2]) -> bool {
     let matrix = to_world.matrix3;
     let (middle, half) = (matrix * ((min + max) * 0.5), (max - min) * 0.5);
     let [x, y, z] = [matrix.x_axis * half.x, matrix.y_axis * half.y, matrix.z_axis * half.z];
-    // Opposite corners are as far away.
+    // Four of the eight corners; the opposite ones are equally far from the centre.
     let corners = [x + y + z, x + y - z, x - y + z, x - y - z];
     let radius = corners.into_iter().map(DVec3::length_squared).fold(0.0, f64::max);
 
@@ -30,7 +31,8 @@ fn may_hit_box(ray: Ray3d, max_distance: f32, to_world: &DAffine3, [min, max]: [
     let way = to_world.translation + middle - origin;
     let along = (way.dot(direction) / direction.length_squared()).max(0.0).min(f64::from(max_distance));
     let apart = (way - direction * along).length_squared();
-    // Far more than rounding makes: a millionth of the distances from the origin, and a part of the radius.
+    // These margins far exceed rounding errors: a millionth of the distances from the origin, and a share of the
+    // radius.
     let distances = to_world.translation.length_squared() + middle.length_squared() + origin.length_squared();
     apart <= 1.001 * radius + 1e-12 * distances
 }

@@ -1,5 +1,5 @@
-//! Keeps terrains' `GlobalTransform` true in apps where nobody propagates transforms, such as servers with no more than
-//! Bevy's `MinimalPlugins`: rays would look for each terrain at the origin.
+//! Updates terrains' `GlobalTransform` in apps that do not propagate transforms, such as servers with only Bevy's
+//! `MinimalPlugins`. Without it, rays would look for each terrain at the origin.
 
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::entity_disabling::Disabled;
@@ -11,15 +11,15 @@ use bevy_transform::systems::StaticTransformOptimizations;
 
 use crate::terrain::TerrainVolume;
 
-/// Whether Bevy's `TransformPlugin` may be missing; it brings this resource.
+/// True if Bevy's `TransformPlugin`, which inserts this resource, may be missing.
 pub(super) fn may_lack_propagation(propagation: Option<Res<StaticTransformOptimizations>>) -> bool {
     propagation.is_none()
 }
 
-/// Gives terrains the `GlobalTransform` that their `Transform` and those above it ask for.
+/// Computes terrains' `GlobalTransform` from their `Transform` and those of their ancestors.
 ///
-/// One that somebody else has written to stays as it is: some other plugin propagates it, in its own way. So does what is
-/// in a big space, whose root has no `Transform`.
+/// A `GlobalTransform` that something else has written stays: another plugin propagates it in its own way. Terrains in
+/// a big space, whose root has no `Transform`, also stay as they are.
 pub(super) fn keep_transforms(
     mut terrains: Query<(Entity, &mut GlobalTransform), (With<TerrainVolume>, Allow<Disabled>)>,
     transforms: TransformHelper,
@@ -44,7 +44,7 @@ pub(super) fn keep_transforms(
     }
 }
 
-/// Whether both are the same, bit for bit; also where a number is NaN.
+/// True if both are equal bit for bit, NaN included.
 fn is_same(a: &GlobalTransform, b: &GlobalTransform) -> bool {
     let [a, b] = [a, b].map(|transform| transform.affine().to_cols_array().map(f32::to_bits));
     a == b

@@ -1,16 +1,16 @@
-//! Which terrains are hidden, noted in each update.
+//! The hidden terrains, recorded once per update.
 //!
-//! Questions go by the note: if they read `Visibility` themselves, no system that asks one could change the `Visibility`
-//! of anything else. Bevy's own result, `InheritedVisibility`, is missing where there is no renderer.
+//! Queries read this record. If they read `Visibility` itself, a system with a query could not change the `Visibility`
+//! of any other entity. Bevy's own result, `InheritedVisibility`, is missing in apps without a renderer.
 
 use bevy_camera::visibility::Visibility;
 use bevy_ecs::prelude::*;
 
-/// Whether a terrain was hidden when that was last noted.
+/// Records whether a terrain was hidden in the latest update.
 #[derive(Component, Default, PartialEq)]
 pub(super) struct IsHidden(pub(super) bool);
 
-/// Notes which terrains are hidden: by their own `Visibility`, or by what they inherit.
+/// Records which terrains are hidden, by their own `Visibility` or an inherited one.
 pub(super) fn note_visibility(
     mut terrains: Query<(Entity, &mut IsHidden)>,
     visibility: Query<(&Visibility, Option<&ChildOf>)>,
@@ -20,7 +20,8 @@ pub(super) fn note_visibility(
     }
 }
 
-/// As Bevy does it: what inherits goes by its parent, and counts as visible below one without any `Visibility`.
+/// Resolves visibility as Bevy does: `Inherited` follows the parent, and means visible if the parent has no
+/// `Visibility`.
 fn may_be_drawn(terrain: Entity, all: &Query<(&Visibility, Option<&ChildOf>)>) -> bool {
     let mut next = Some(terrain);
     while let Some((visibility, parent)) = next.and_then(|entity| all.get(entity).ok()) {
