@@ -1,13 +1,13 @@
-//! Worlds as files: what a terrain is made of, read from `assets`, also while the game runs (feature `terrain_files`).
+//! Terrain files: descriptions of terrains, read from `assets`, also while the game runs (feature `terrain_files`).
 //!
-//! A world file is [RON](https://docs.rs/ron) text whose name ends in `.terrain.ron`. This one is a hilly country without
-//! end, 256 voxels high; what a file does not name has its default:
+//! A terrain file is [RON](https://docs.rs/ron) text whose name ends in `.terrain.ron`. This one describes endless
+//! hills, 256 voxels high. Fields that a file leaves out have their defaults:
 //!
 //! ```
 //! # use bevy_marchless::prelude::*;
 //! # use bevy_marchless::source::prelude::*;
 //! # use bevy_marchless::file::TerrainDescription;
-//! let world = TerrainDescription::from_ron("
+//! let description = TerrainDescription::from_ron("
 //! (
 //!     source: NoiseHeights(
 //!         noise: (seed: 7, zoom: 300.0, octaves: 6),
@@ -18,7 +18,7 @@
 //!     keep: Nothing,
 //! )
 //! ")?;
-//! assert_eq!(world.extent, Extent::ENDLESS.with_y(-2..6));
+//! assert_eq!(description.extent, Extent::ENDLESS.with_y(-2..6));
 //! # Ok::<(), bevy_marchless::file::DescriptionError>(())
 //! ```
 //!
@@ -34,21 +34,22 @@
 //! }
 //! ```
 //!
-//! # While the game runs
-//! When the asset changes, the terrain takes over what has changed in it: another palette only colours it anew, another source
-//! fills it anew. Assets change when their file is read again (Bevy's feature `file_watcher` does so when it is saved,
-//! [`AssetServer::reload`] when it is asked to), and when a system changes them in [`Assets`].
+//! # Changes while the game runs
+//! When the asset changes, the terrain takes over the settings that changed: another palette only colours it again,
+//! another source fills it again. An asset changes when its file is read again, or when a system changes it in
+//! [`Assets`]. Bevy's feature `file_watcher` reads a file again when it is saved, [`AssetServer::reload`] on demand.
 //!
-//! Stamps wait while a file is loading for the first time, and are applied to its world. Meanwhile, and if it cannot be read, is cut short or holds bad settings, the terrain stays as it is;
-//! each failure is told once in the log, with the line where it is. What was changed on the [`Terrain`](crate::terrain::Terrain)
-//! by hand stays until the file changes the same.
+//! While a file is loading for the first time, the terrain stays as it is and its stamps wait. They are applied to the
+//! terrain that the file describes. If the file cannot be read, is cut short or holds bad settings, the terrain also
+//! stays as it is. Each failure is logged once, with the line of the error. Settings that the game changes on the
+//! [`Terrain`](crate::terrain::Terrain) itself stay until the file changes the same setting.
 //!
 //! # The format
-//! Names are those of the settings' fields and variants, so their documentation is the format's. Fields that are left
-//! out have their defaults; unknown ones are refused. `Some` need not be written, nor the
-//! parentheses of settings inside those of a variant: `NoiseHeights(amplitude: 80.0)`. An [`Extent`](crate::terrain::Extent)
-//! names, for the axes along which it ends, the first chunk and one past the last: `(y: (-2, 6))`. Numbers may be `inf`
-//! and `-inf` where the settings allow it. [`TerrainDescription::to_ron`] writes the same format.
+//! The names are those of the settings' fields and variants, so the settings' documentation is also the format's.
+//! Fields that are left out have their defaults; unknown fields are an error. `Some` may be left out, and so may the
+//! inner parentheses of a variant with settings: `NoiseHeights(amplitude: 80.0)`. An [`Extent`](crate::terrain::Extent)
+//! gives the first chunk and one past the last for each axis along which it ends: `(y: (-2, 6))`. Numbers may be `inf`
+//! and `-inf` where the settings allow it. [`TerrainDescription::to_ron`] writes this format.
 
 mod description;
 mod error;
@@ -69,9 +70,10 @@ pub use loader::DescriptionLoader;
 use crate::schedule::MarchlessSystems;
 use crate::terrain::Terrain;
 
-/// Makes its entity's [`Terrain`] what a [`TerrainDescription`] says, and keeps it so when that changes.
+/// Makes its entity's [`Terrain`] follow a [`TerrainDescription`], an asset.
 ///
-/// The terrain's other settings (chunk size, isovalue, normals) stay its own.
+/// The description sets the terrain's source, palette, voxel size, extent and [`Keep`](crate::terrain::Keep). All other
+/// settings (chunk size, isovalue, normals) stay the terrain's own.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Debug, PartialEq, Clone)]
 #[require(Terrain, follow::FollowedFile)]
@@ -85,7 +87,7 @@ pub struct TerrainFilePlugin;
 
 impl Plugin for TerrainFilePlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<TerrainFile>().add_observer(follow::forget_removed_world);
+        app.register_type::<TerrainFile>().add_observer(follow::forget_removed_file);
         register_asset(app);
     }
 
@@ -94,7 +96,7 @@ impl Plugin for TerrainFilePlugin {
     }
 }
 
-/// Registers the asset and its systems, where there is an asset server and it has not been done yet.
+/// Registers the asset and its systems once, if there is an asset server.
 fn register_asset(app: &mut App) {
     let world = app.world();
     if !world.contains_resource::<AssetServer>() || world.contains_resource::<Assets<TerrainDescription>>() {
@@ -103,5 +105,5 @@ fn register_asset(app: &mut App) {
     app.init_asset::<TerrainDescription>()
         .register_asset_reflect::<TerrainDescription>()
         .register_asset_loader(DescriptionLoader)
-        .add_systems(PostUpdate, (follow::follow_worlds, follow::report_failures).before(MarchlessSystems::Work));
+        .add_systems(PostUpdate, (follow::follow_files, follow::report_failures).before(MarchlessSystems::Work));
 }

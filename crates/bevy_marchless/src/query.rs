@@ -98,7 +98,7 @@ impl TerrainQuery<'_, '_> {
     /// # #[derive(Component)]
     /// # struct Water;
     /// /// Finds the ground below the water.
-    /// fn look_through_water(ray: Ray3d, terrains: &TerrainQuery, water: &Query<(), With<Water>>) -> Option<TerrainHit> {
+    /// fn cast_below_water(ray: Ray3d, terrains: &TerrainQuery, water: &Query<(), With<Water>>) -> Option<TerrainHit> {
     ///     let is_ground = |terrain| terrains.is_visible(terrain) && !water.contains(terrain);
     ///     terrains.ray_cast_where(ray, 500.0, is_ground)
     /// }

@@ -1,4 +1,4 @@
-//! [`TerrainDescription`]: what a world is made of, as plain data.
+//! [`TerrainDescription`]: the settings of a terrain, as plain data.
 
 use bevy_asset::Asset;
 use bevy_reflect::prelude::*;
@@ -17,28 +17,28 @@ use crate::source::{
 };
 use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain};
 
-/// What a world is made of: plain data, read from a file or written in code, kept as an asset.
+/// A description of a terrain: plain data, read from a file or written in code, kept as an asset.
 #[derive(Asset, Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainDescription {
-    /// What it is made of before it is edited. A file must name it.
+    /// The source of the terrain's samples before it is edited. A file must name it.
     pub source: SourceDescription,
-    /// As of [`Terrain::palette`]. Default: as of [`Palette`].
+    /// Sets [`Terrain::palette`]. Default: that of [`Palette`].
     #[serde(default)]
     pub palette: Palette,
-    /// As of [`Terrain::voxel_size`]. Default: 1.
+    /// Sets [`Terrain::voxel_size`]. Default: 1.
     #[serde(default = "default_voxel_size")]
     pub voxel_size: f32,
-    /// As of [`Terrain::extent`]. Default: as of [`Terrain`], 8 × 4 × 8 chunks.
+    /// Sets [`Terrain::extent`]. Default: that of [`Terrain`], 8 × 4 × 8 chunks.
     #[serde(default = "default_extent")]
     pub extent: Extent,
-    /// As of [`Terrain::keep`]; an extent without end needs another than the default. Default: everything.
+    /// Sets [`Terrain::keep`]. Default: everything, which an endless extent does not allow.
     #[serde(default)]
     pub keep: Keep,
 }
 
-/// What a world is made of before it is edited.
+/// A description of a terrain's source: its samples before it is edited.
 #[derive(Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 #[non_exhaustive]
@@ -61,25 +61,25 @@ pub enum SourceDescription {
     HeightMap(HeightMapDescription),
 }
 
-/// A height map of a world: which picture it is, and how its pixels become ground.
+/// A description of a height map: the path of its picture, and how the pixels become ground.
 #[cfg(feature = "png")]
 #[derive(Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 #[serde(deny_unknown_fields)]
 pub struct HeightMapDescription {
-    /// Where the picture is, a 16-bit greyscale PNG file: a path in `assets`, as the asset server takes it. When that
-    /// file changes, the world is loaded again.
+    /// The path of the picture, a 16-bit greyscale PNG file, in `assets`, as the asset server takes it. When the
+    /// picture changes, the description is loaded again.
     pub picture: String,
     /// How its pixels become ground.
     #[serde(default)]
     pub settings: HeightMapSettings,
-    /// The picture's samples; not written to files. The asset loader reads them; in code, set them.
+    /// The picture's samples; not written to files. The asset loader reads them; code must set them.
     #[serde(skip)]
     pub map: Option<HeightMap>,
 }
 
 impl TerrainDescription {
-    /// A world made of `source`, else as the defaults.
+    /// A description with this source and the default settings.
     pub fn new(source: SourceDescription) -> Self {
         Self {
             source,
@@ -90,17 +90,17 @@ impl TerrainDescription {
         }
     }
 
-    /// The world that a file's text describes. Pictures are not read yet.
+    /// Parses the text of a terrain file. Does not read pictures.
     ///
     /// # Errors
-    /// [`DescriptionError`] for text that is cut short, is no such RON, or holds settings that are out of range.
+    /// [`DescriptionError`] for text that is cut short, is not such RON, or holds settings that are out of range.
     pub fn from_ron(text: &str) -> Result<Self, DescriptionError> {
-        let world: Self = options().from_str(text).map_err(|error| DescriptionError::from_ron(error, text))?;
-        world.check().map_err(|error| error.in_text(text))?;
-        Ok(world)
+        let description: Self = options().from_str(text).map_err(|error| DescriptionError::from_ron(error, text))?;
+        description.check().map_err(|error| error.in_text(text))?;
+        Ok(description)
     }
 
-    /// The same of a file's bytes.
+    /// Parses the bytes of a terrain file, which must be UTF-8; see [`from_ron`](Self::from_ron).
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, DescriptionError> {
         let text = str::from_utf8(bytes).map_err(|error| {
             let valid = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
@@ -109,16 +109,16 @@ impl TerrainDescription {
         Self::from_ron(text)
     }
 
-    /// The text of a file that describes this world.
+    /// The text of a terrain file with this description.
     ///
     /// # Errors
-    /// [`DescriptionError::Write`] for what is nested too deeply.
+    /// [`DescriptionError::Write`] for settings that are nested too deeply.
     pub fn to_ron(&self) -> Result<String, DescriptionError> {
         let pretty = PrettyConfig::new();
         options().to_string_pretty(self, pretty).map_err(|error| DescriptionError::Write { message: error.to_string() })
     }
 
-    /// A terrain of this world.
+    /// A terrain with these settings.
     ///
     /// # Errors
     /// [`DescriptionError`] for settings that are out of range and for a height map whose picture was not read.
@@ -128,7 +128,8 @@ impl TerrainDescription {
         Ok(terrain)
     }
 
-    /// Gives a terrain what differs from the world that it had `before`. Where there is an error, the terrain stays.
+    /// Sets those of a terrain's settings that differ from the description `before`, or all of them without one. On an
+    /// error, the terrain stays as it is.
     pub(super) fn apply(&self, before: Option<&Self>, terrain: &mut Terrain) -> Result<(), DescriptionError> {
         let mut next = terrain.clone();
         if before.is_none_or(|before| before.source != self.source) {
@@ -151,7 +152,7 @@ impl TerrainDescription {
         Ok(())
     }
 
-    /// Whether all settings are in their ranges; a picture may still be missing.
+    /// Checks that all settings are in their ranges; a picture may still be missing.
     fn check(&self) -> Result<(), DescriptionError> {
         #[cfg(feature = "png")]
         if let SourceDescription::HeightMap(HeightMapDescription { settings, map: None, .. }) = &self.source {
@@ -163,7 +164,7 @@ impl TerrainDescription {
 }
 
 impl SourceDescription {
-    /// The source itself.
+    /// Builds the source.
     ///
     /// # Errors
     /// [`DescriptionError`] for settings that are out of range and for a height map whose picture was not read.
@@ -194,7 +195,7 @@ fn default_extent() -> Extent {
     Terrain::default().extent
 }
 
-/// What makes files shorter to write.
+/// The RON options: extensions that make files shorter to write.
 fn options() -> Options {
     Options::default().with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
 }

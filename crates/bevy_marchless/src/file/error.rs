@@ -1,4 +1,4 @@
-//! [`DescriptionError`]: what is wrong with a world, and where.
+//! [`DescriptionError`]: an error in a terrain's description, and its place in the file.
 
 use std::io;
 
@@ -8,14 +8,14 @@ use thiserror::Error;
 use crate::source::SourceError;
 use crate::terrain::TerrainError;
 
-/// Why a world cannot be made, or its file not be read. Lines and columns count from 1.
+/// An error in a terrain's description or its file. Lines and columns count from 1.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DescriptionError {
     /// The file's bytes could not be read.
     #[error("the world file cannot be read: {0}")]
     Read(#[from] io::Error),
-    /// The text ends before the world does.
+    /// The text ends before the description does.
     #[error("the world file is cut short: it ends in line {line}, column {column}, in the middle of the world")]
     CutShort {
         /// The last line.
@@ -23,36 +23,36 @@ pub enum DescriptionError {
         /// One past its end.
         column: usize,
     },
-    /// The file is no text.
+    /// The file is not UTF-8 text.
     #[error("a world file must be UTF-8 text, but there are other bytes in line {line}")]
     NotText {
-        /// Where they begin.
+        /// The line of the first byte that is not UTF-8.
         line: usize,
     },
-    /// The text is no RON, or does not describe a world: unknown or missing fields, values of wrong types.
+    /// The text is not RON, or does not describe a terrain: unknown or missing fields, values of wrong types.
     #[error("line {line}, column {column}: {message}")]
     Text {
-        /// Where it is.
+        /// The line of the error.
         line: usize,
-        /// Where it is.
+        /// The column of the error.
         column: usize,
-        /// What was expected and what came.
+        /// The parser's message: what was expected and what was found.
         message: String,
     },
     /// A setting of the source is out of range.
     #[error("{}{error}", in_lines(lines))]
     Source {
-        /// Which, and what is allowed.
+        /// The setting, and its allowed range.
         error: SourceError,
-        /// The lines in which such a number stands: one of them is wrong. Empty where there is no file.
+        /// The lines that hold this number; the error is in one of them. Empty for a description without a file.
         lines: Vec<usize>,
     },
     /// A setting of the terrain is out of range.
     #[error("{}{error}", in_lines(lines))]
     Terrain {
-        /// Which, and what is allowed.
+        /// The setting, and its allowed range.
         error: TerrainError,
-        /// The lines in which such a number stands: one of them is wrong. Empty where there is no file.
+        /// The lines that hold this number; the error is in one of them. Empty for a description without a file.
         lines: Vec<usize>,
     },
     /// A height map's picture could not be read.
@@ -60,19 +60,19 @@ pub enum DescriptionError {
     Picture {
         /// Its path in `assets`.
         picture: String,
-        /// Why.
+        /// The reason.
         message: String,
     },
-    /// A height map without samples: worlds made in code bring them, only files have them read.
+    /// A height map has no samples. The loader reads them for files; code must set them.
     #[error("the picture '{picture}' has not been read")]
     NoPicture {
         /// Its path in `assets`.
         picture: String,
     },
-    /// A world that cannot be written.
+    /// The description cannot be written.
     #[error("the world cannot be written: {message}")]
     Write {
-        /// Why.
+        /// The reason.
         message: String,
     },
 }
@@ -90,12 +90,12 @@ impl From<TerrainError> for DescriptionError {
 }
 
 impl DescriptionError {
-    /// Bytes that are not text: after `valid` bytes that are, or cut off within a character.
+    /// The error for bytes that are not UTF-8, after `valid` text. `cut_off`: whether they end within a character.
     pub(super) fn from_utf8(valid: &str, cut_off: bool) -> Self {
         if cut_off { Self::cut_short(valid) } else { Self::NotText { line: valid.matches('\n').count() + 1 } }
     }
 
-    /// What the parser says about a text.
+    /// Converts an error of the RON parser; an error at the end of the text means that the text is cut short.
     pub(super) fn from_ron(error: SpannedError, text: &str) -> Self {
         let (start, end) = (error.span.start, error.span.end);
         let rest = after(text, start.line, start.col).trim();
@@ -113,7 +113,7 @@ impl DescriptionError {
         }
     }
 
-    /// The same about a file of this text: with the lines in which the number stands.
+    /// Adds the lines of `text` that hold the wrong number.
     pub(super) fn in_text(self, text: &str) -> Self {
         match self {
             Self::Source { error, .. } => {
@@ -155,12 +155,12 @@ fn place(text: &str, offset: usize) -> (usize, usize) {
     (before.matches('\n').count() + 1, last.chars().count() + 1)
 }
 
-/// Whether names and numbers have such characters.
+/// True for the characters of names and numbers.
 fn is_of_word(c: char) -> bool {
     c.is_alphanumeric() || "+-._".contains(c)
 }
 
-/// The lines, counted from 1, in which a number stands, comments left aside.
+/// The lines, counted from 1, that hold a number outside of comments.
 fn lines_with(text: &str, number: f64) -> Vec<usize> {
     let is_it = |word: &str| {
         let same =

@@ -1,4 +1,4 @@
-//! Lets terrains follow the worlds that they are to be.
+//! Systems that let terrains follow their files.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -11,22 +11,23 @@ use bevy_ecs::query::Allow;
 use super::{DescriptionError, TerrainDescription, TerrainFile};
 use crate::terrain::{Terrain, TerrainVolume};
 
-/// What is known of a terrain's world.
+/// The state of a terrain that follows a file.
 #[derive(Component, Default)]
 pub(super) struct FollowedFile {
-    /// The world that the terrain was made last.
-    world: Option<TerrainDescription>,
-    /// Whether the terrain is to be another one, whose file has not been read yet.
+    /// The description that was applied last.
+    description: Option<TerrainDescription>,
+    /// Whether the terrain waits for a file that has not been read yet.
     is_loading: bool,
 }
 
-/// Gives terrains, disabled ones too, what has changed in their worlds. Stamps on a terrain wait while its file is being read.
-pub(super) fn follow_worlds(
+/// Applies changes of descriptions to their terrains, disabled ones included. Stamps on a terrain wait while its file
+/// is being read.
+pub(super) fn follow_files(
     mut terrains: Query<
         (Entity, Ref<TerrainFile>, &mut Terrain, &mut TerrainVolume, &mut FollowedFile),
         Allow<Disabled>,
     >,
-    worlds: Res<Assets<TerrainDescription>>,
+    descriptions: Res<Assets<TerrainDescription>>,
     server: Res<AssetServer>,
     mut events: MessageReader<AssetEvent<TerrainDescription>>,
 ) {
@@ -42,24 +43,25 @@ pub(super) fn follow_worlds(
         if !may_be_another && !changed.contains(&handle.0.id()) {
             continue;
         }
-        let world = worlds.get(&handle.0);
-        followed.is_loading = world.is_none() && matches!(server.load_state(&handle.0), LoadState::Loading);
+        let description = descriptions.get(&handle.0);
+        followed.is_loading = description.is_none() && matches!(server.load_state(&handle.0), LoadState::Loading);
         volume.set_loading(followed.is_loading);
-        let Some(world) = world.filter(|world| followed.world.as_ref() != Some(*world)) else { continue };
-        // Only what is applied counts as a change of the terrain.
+        let is_new = |description: &&TerrainDescription| followed.description.as_ref() != Some(*description);
+        let Some(description) = description.filter(is_new) else { continue };
+        // A clone, so that the terrain counts as changed only if the description could be applied.
         let mut next = terrain.clone();
-        match world.apply(followed.world.as_ref(), &mut next) {
+        match description.apply(followed.description.as_ref(), &mut next) {
             Ok(()) => {
                 *terrain = next;
-                followed.world = Some(world.clone());
+                followed.description = Some(description.clone());
             }
             Err(error) => bevy_log::warn!("terrain {entity}: its world is not applied, and it stays as it is: {error}"),
         }
     }
 }
 
-/// Without its world a terrain waits for nothing.
-pub(super) fn forget_removed_world(
+/// Lets a terrain that loses its [`TerrainFile`] stop waiting, and forgets its description.
+pub(super) fn forget_removed_file(
     removed: On<Remove, TerrainFile>,
     mut terrains: Query<(&mut TerrainVolume, &mut FollowedFile), Allow<Disabled>>,
 ) {
@@ -69,13 +71,13 @@ pub(super) fn forget_removed_world(
     }
 }
 
-/// Tells once of each world file that could not be loaded.
+/// Logs each file that could not be loaded, once.
 pub(super) fn report_failures(
     terrains: Query<&TerrainFile>,
     server: Res<AssetServer>,
     mut reported: Local<HashMap<AssetId<TerrainDescription>, (Arc<AssetLoadError>, String)>>,
 ) {
-    let used: HashSet<_> = terrains.iter().map(|world| world.0.id()).collect();
+    let used: HashSet<_> = terrains.iter().map(|file| file.0.id()).collect();
     reported.retain(|id, _| used.contains(id));
     for id in used {
         match server.load_state(id) {
@@ -84,7 +86,7 @@ pub(super) fn report_failures(
                 if before.is_some_and(|(before, _)| Arc::ptr_eq(before, &error)) {
                     continue;
                 }
-                // A reload may try twice, and fail twice in the same way.
+                // A reload may load twice, and fail twice in the same way.
                 let text = describe(&error);
                 if before.is_none_or(|(_, before)| *before != text) {
                     bevy_log::warn!("terrains stay as they are, since their {text}");
@@ -99,7 +101,7 @@ pub(super) fn report_failures(
     }
 }
 
-/// The file and what is wrong with it, in one line, without a backtrace.
+/// The file and its error, in one line, without a backtrace.
 fn describe(error: &AssetLoadError) -> String {
     if let AssetLoadError::AssetLoaderError(loading) = error
         && let Some(error) = loading.error().downcast_ref::<DescriptionError>()

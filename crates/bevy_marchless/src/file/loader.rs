@@ -1,4 +1,4 @@
-//! Reads world files, and the pictures that they name.
+//! [`DescriptionLoader`]: reads terrain files, and the pictures that they name.
 
 use bevy_asset::io::Reader;
 use bevy_asset::{AssetLoader, LoadContext};
@@ -27,9 +27,9 @@ impl AssetLoader for DescriptionLoader {
     ) -> Result<TerrainDescription, DescriptionError> {
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).await?;
-        let mut world = TerrainDescription::from_bytes(&bytes)?;
-        read_picture(&mut world, context).await?;
-        Ok(world)
+        let mut description = TerrainDescription::from_bytes(&bytes)?;
+        read_picture(&mut description, context).await?;
+        Ok(description)
     }
 
     fn extensions(&self) -> &[&str] {
@@ -37,20 +37,26 @@ impl AssetLoader for DescriptionLoader {
     }
 }
 
-/// Reads the picture of a height map, and so makes the world depend on it.
+/// Reads the picture of a height map, and so makes the description's asset depend on it.
 #[cfg(feature = "png")]
-async fn read_picture(world: &mut TerrainDescription, context: &mut LoadContext<'_>) -> Result<(), DescriptionError> {
-    if let SourceDescription::HeightMap(height_map) = &mut world.source {
+async fn read_picture(
+    description: &mut TerrainDescription,
+    context: &mut LoadContext<'_>,
+) -> Result<(), DescriptionError> {
+    if let SourceDescription::HeightMap(height_map) = &mut description.source {
         let failed = |message: String| DescriptionError::Picture { picture: height_map.picture.clone(), message };
         let bytes = context.read_asset_bytes(&height_map.picture).await.map_err(|error| failed(error.to_string()))?;
         let map = HeightMap::from_bytes(&bytes, HeightMapSettings::default());
         height_map.map = Some(map.map_err(|error| failed(error.to_string()))?);
-        world.source.build()?;
+        description.source.build()?;
     }
     Ok(())
 }
 
 #[cfg(not(feature = "png"))]
-async fn read_picture(_world: &mut TerrainDescription, _context: &mut LoadContext<'_>) -> Result<(), DescriptionError> {
+async fn read_picture(
+    _description: &mut TerrainDescription,
+    _context: &mut LoadContext<'_>,
+) -> Result<(), DescriptionError> {
     Ok(())
 }
