@@ -1,9 +1,10 @@
-//! Terrain in a big space (the crate `big_space`), where nothing shakes however far one goes from the origin.
+//! Terrain in a big space (the crate `big_space`), which does not jitter at any distance from the origin.
 //!
-//! A terrain whose entity is a `Grid` has its chunks in the grid's cells: each chunk's entity gets a `CellCoord` and a
-//! `Transform` relative to that cell's middle, both computed in double precision from the chunk's position, in the update that
-//! spawns it. [`TerrainQuery`](crate::query::TerrainQuery) and viewers then go by the grid's exact
-//! place relative to the floating origin. World space is relative to the floating origin's cell, as everywhere in a big space.
+//! If a terrain's entity is a `Grid`, its chunks lie in the grid's cells. In the update that spawns it, each chunk's
+//! entity gets a `CellCoord` and a `Transform` relative to the middle of that cell, both computed in double precision
+//! from the chunk's position. [`TerrainQuery`](crate::query::TerrainQuery) and viewers use the grid's exact position
+//! relative to the floating origin. World space is relative to the floating origin's cell, as everywhere in a big
+//! space.
 //!
 //! # How to set it up
 //! ```
@@ -32,23 +33,26 @@
 //! }
 //! ```
 //!
-//! - The terrain's entity is a grid *in* a big space, not its root, which must not have a `Transform`. The scale of a grid's `Transform` is
-//!   ignored, as `big_space` does; its place and rotation count.
-//! - The floating origin (mostly the camera) belongs in the terrain's own grid, or in one that is neither turned against it nor offset by
-//!   fractions of a cell. In others `big_space` rounds the way between both to an `f32` of at most half a cell.
-//! - The terrain's source, stamps and hits are in the terrain's own space, in double precision, from its lattice's origin on.
+//! - The terrain's entity is a grid *in* a big space, not its root, which must not have a `Transform`. A grid's
+//!   translation and rotation count; its scale is ignored, as in `big_space`.
+//! - Put the floating origin (usually the camera) into the terrain's own grid, or into one that is neither rotated
+//!   against it nor offset by fractions of a cell. In other grids, `big_space` rounds the distance between both to an
+//!   `f32` of at most half a cell.
+//! - The terrain's source, stamps and hits are in the terrain's own space, in double precision, from the origin of its
+//!   lattice.
 //!
 //! # Order of systems
-//! Chunks are placed by observers, as they are spawned in [`MarchlessSystems::Work`]. All of [`MarchlessSystems`] runs before
-//! `TransformSystems::Propagate`, in which `big_space` does its own propagation, so that a chunk is where it belongs in the very
-//! update that spawns it. Queries in `Update` see the floating origin where it was when transforms were last propagated, like
-//! every `GlobalTransform`.
+//! Observers place chunks when they are spawned, in [`MarchlessSystems::Work`]. All of [`MarchlessSystems`] runs before
+//! `TransformSystems::Propagate`, in which `big_space` propagates transforms. So a chunk is at its place in the update
+//! that spawns it. Queries in `Update` use the floating origin's position of the last propagation, as with every
+//! `GlobalTransform`.
 //!
-//! # What it costs
-//! Two more components, and one or two moves between archetypes as a chunk is spawned. Where the terrain's grid takes part in
-//! `BigSpaceStationaryPlugin` (among `BigSpaceDefaultPlugins`), chunks are marked `Stationary`, and cost nothing more as long as
-//! the floating origin stays in its cell; without it, or after a change of settings has moved them, `big_space` looks at
-//! each chunk in every update. When the floating origin changes its cell, all chunks get a new `GlobalTransform`.
+//! # Performance
+//! Each chunk has two more components, and moves between archetypes once or twice when it is spawned. If the terrain's
+//! grid takes part in `BigSpaceStationaryPlugin` (one of `BigSpaceDefaultPlugins`), chunks are marked `Stationary`.
+//! They then cost nothing while the floating origin stays in its cell. Without this plugin, or after a change of
+//! settings has moved the chunks, `big_space` checks each chunk in every update. When the floating origin changes its
+//! cell, all chunks get a new `GlobalTransform`.
 
 use ::big_space::precision::GridPrecision;
 use ::big_space::prelude::{CellCoord, Grid, GridDirtyTick, Stationary};
@@ -75,7 +79,7 @@ impl Plugin for BigSpacePlugin {
     }
 }
 
-/// A chunk gets its cell as soon as it is there. It never moves, so that propagation may pass over it.
+/// Gives a new chunk its cell. A chunk does not move, so propagation may skip it.
 fn place_new_chunk(
     added: On<Add, Chunk>,
     chunks: Query<&Chunk>,
@@ -94,7 +98,7 @@ fn place_new_chunk(
     }
 }
 
-/// A terrain that becomes a grid, or another one, takes its chunks with it.
+/// Places the chunks of a terrain that becomes a grid, or whose grid is replaced.
 fn place_in_new_grid(
     inserted: On<Insert, Grid>,
     terrains: Query<(&TerrainVolume, &Grid, &Children)>,
@@ -106,7 +110,8 @@ fn place_in_new_grid(
     }
 }
 
-/// Chunks move where the size of a voxel changes. How large it was is remembered, since settings may take effect later.
+/// Moves chunks when the voxel size in effect changes. It is compared with the size of the last update, because
+/// settings may take effect later than they change.
 fn follow_settings(
     terrains: Query<(Entity, &TerrainVolume, &Grid, &Children)>,
     chunks: Query<Placed>,
@@ -124,7 +129,7 @@ fn follow_settings(
     }
 }
 
-/// A terrain that is no grid any more has chunks without cells.
+/// Removes the cells of the chunks of a terrain that stops being a grid.
 fn leave_removed_grid(
     removed: On<Remove, Grid>,
     terrains: Query<(&TerrainVolume, &Children)>,
@@ -139,10 +144,11 @@ fn leave_removed_grid(
     }
 }
 
-/// A chunk and where it is.
+/// A chunk, and its cell and transform.
 type Placed = (Entity, &'static Chunk, Option<&'static CellCoord>, &'static Transform);
 
-/// Places those chunks of a terrain that are elsewhere. They are awake from then on: what sleeps would not be propagated.
+/// Places the chunks of a terrain again, as far as they are misplaced. These lose `Stationary`, since stationary
+/// entities would not be propagated.
 fn place_again(
     volume: &TerrainVolume,
     grid: &Grid,
@@ -159,9 +165,10 @@ fn place_again(
     }
 }
 
-/// The cell whose middle is nearest to a chunk's lowest corner, and the chunk's transform relative to that.
+/// The cell whose middle is nearest to a chunk's lowest corner, and the chunk's transform relative to that middle.
 ///
-/// Out to 2²⁹ voxels the corner and the cell's middle are exact in `f64`; only the offset is rounded, to an `f32`.
+/// Up to 2²⁹ voxels from the origin, the corner and the cell's middle are exact in `f64`. Only the offset is rounded,
+/// to an `f32`.
 fn place(position: IVec3, settings: &Terrain, grid: &Grid) -> (CellCoord, Transform) {
     let corner = position.as_dvec3() * f64::from(settings.chunk_cells) * f64::from(settings.voxel_size);
     let edge = f64::from(grid.cell_edge_length());

@@ -1,4 +1,4 @@
-//! [`TerrainDiagnosticsPlugin`]: figures in Bevy's `DiagnosticsStore`.
+//! [`TerrainDiagnosticsPlugin`]: measurements of the plugin's work in Bevy's `DiagnosticsStore`.
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic as _};
@@ -17,28 +17,28 @@ use crate::terrain::TerrainVolume;
 pub struct TerrainDiagnosticsPlugin;
 
 impl TerrainDiagnosticsPlugin {
-    /// How many chunks have something to draw.
+    /// The number of chunks whose mesh is not empty.
     pub const CHUNKS: DiagnosticPath = DiagnosticPath::const_new("marchless/chunks");
-    /// How many triangles they have in all.
+    /// The number of triangles of all chunks.
     pub const TRIANGLES: DiagnosticPath = DiagnosticPath::const_new("marchless/triangles");
-    /// How many chunks wait for their samples.
+    /// The number of chunks that wait for their samples.
     pub const FILL_QUEUE: DiagnosticPath = DiagnosticPath::const_new("marchless/fill_queue");
-    /// How many chunks wait for a new mesh.
+    /// The number of chunks that wait for a new mesh.
     pub const MESH_QUEUE: DiagnosticPath = DiagnosticPath::const_new("marchless/mesh_queue");
-    /// How long it took to mesh a chunk, in milliseconds; measured in updates in which some chunk was meshed.
+    /// The average time to mesh a chunk, in milliseconds; measured in updates in which a chunk was meshed.
     pub const MESH_TIME: DiagnosticPath = DiagnosticPath::const_new("marchless/mesh_time");
-    /// How many updates after the one that read its stamp an edit was shown; 0 is the same one.
+    /// The number of updates from reading a stamp to showing its edit; 0 means within the same update.
     pub const EDIT_UPDATES: DiagnosticPath = DiagnosticPath::const_new("marchless/edit_updates");
-    /// How long after its stamp was read an edit was shown, in milliseconds.
+    /// The time from reading a stamp to showing its edit, in milliseconds.
     pub const EDIT_TIME: DiagnosticPath = DiagnosticPath::const_new("marchless/edit_time");
-    /// How many chunks in range wait for their samples or their mesh.
+    /// The number of chunks in range that wait for their samples or their mesh.
     pub const WAITING_CHUNKS: DiagnosticPath = DiagnosticPath::const_new("marchless/waiting_chunks");
-    /// How long the plugin's systems took in an update, in milliseconds.
+    /// The time that the plugin's systems took in an update, in milliseconds.
     pub const MAIN_THREAD: DiagnosticPath = DiagnosticPath::const_new("marchless/main_thread");
-    /// How much memory samples and geometry take, in bytes. Samples are gone through a part at a time, so that it lags an
-    /// update behind for every 32 chunks that have some.
+    /// The memory of samples and geometry, in bytes. Each update counts the samples of 32 chunks, so the value lags one
+    /// update behind for every 32 chunks with samples.
     pub const RESIDENT_BYTES: DiagnosticPath = DiagnosticPath::const_new("marchless/resident_bytes");
-    /// The same, divided by how many chunks have something to draw.
+    /// The memory of samples and geometry, in bytes per chunk whose mesh is not empty.
     pub const BYTES_PER_SURFACE_CHUNK: DiagnosticPath = DiagnosticPath::const_new("marchless/bytes_per_surface_chunk");
 }
 
@@ -64,7 +64,7 @@ impl Plugin for TerrainDiagnosticsPlugin {
     }
 }
 
-/// What is drawn, in all.
+/// The totals of all meshes that are drawn.
 #[derive(Resource, Default)]
 struct GeometryTotals {
     chunks: u32,
@@ -100,21 +100,21 @@ fn take_away_geometry(
     }
 }
 
-/// Going through the samples of all terrains, a part in each update.
+/// A sweep over the samples of all terrains that counts their memory, a part in each update.
 #[derive(Default)]
 struct Sweep {
-    /// The terrain that is being gone through, from which position on, and what has been found of it.
+    /// The current terrain, the chunk from which to continue, and the bytes counted so far.
     at: Option<(Entity, [i32; 3], usize)>,
-    /// What the last sweep over each terrain that is complete found. Unit: bytes.
+    /// The result of the last complete sweep over each terrain. [Units: bytes]
     found: EntityHashMap<usize>,
 }
 
-/// This many chunks are looked at per update.
+/// The number of chunks that a sweep counts per update.
 const SWEPT: usize = 32;
 
 impl Sweep {
-    /// Goes on; where a terrain ends, the next one begins.
-    fn go_on(&mut self, volumes: &Query<(Entity, &TerrainVolume)>) {
+    /// Continues the sweep by one part; after the end of a terrain, the next one follows.
+    fn advance(&mut self, volumes: &Query<(Entity, &TerrainVolume)>) {
         if self.found.len() > volumes.iter().len() {
             self.found.retain(|terrain, _| volumes.contains(*terrain));
         }
@@ -162,7 +162,7 @@ fn measure(
     diagnostics.add_measurement(&TerrainDiagnosticsPlugin::WAITING_CHUNKS, || (to_come + to_fill + to_mesh) as f64);
     let milliseconds = |time: core::time::Duration| time.as_secs_f64() * 1e3;
     diagnostics.add_measurement(&TerrainDiagnosticsPlugin::MAIN_THREAD, || milliseconds(budget.spent()));
-    sweep.go_on(&volumes);
+    sweep.advance(&volumes);
     if sweep.found.len() == volumes.iter().len() {
         let bytes = (sweep.found.values().sum::<usize>() + notes + drawn.bytes) as f64;
         diagnostics.add_measurement(&TerrainDiagnosticsPlugin::RESIDENT_BYTES, || bytes);

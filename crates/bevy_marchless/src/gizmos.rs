@@ -1,4 +1,4 @@
-//! [`ChunkGizmosPlugin`]: the bounds of chunks, in colours that tell their states.
+//! [`ChunkGizmosPlugin`]: draws the bounds of chunks, in colours that show their states.
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_color::Color;
@@ -16,22 +16,22 @@ use crate::chunk::{Chunk, ChunkGeometry, chunk_transform};
 use crate::cover::LeafState;
 use crate::terrain::TerrainVolume;
 
-/// Whether the bounds of chunks are drawn. Default: no.
+/// Whether the bounds of chunks are drawn. Default: false.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default, Debug, PartialEq, Clone)]
 pub struct ShowChunkBounds(pub bool);
 
-/// The gizmos' group, so that their line width and more can be set in the `GizmoConfigStore`.
+/// The gizmo group of chunk bounds: their colours. Line width and more can be set in the `GizmoConfigStore`.
 #[derive(Reflect, GizmoConfigGroup, Clone, Debug)]
 #[reflect(Default, Debug, Clone)]
 pub struct ChunkBoundsGizmos {
-    /// The colour of chunks that have something to draw.
+    /// The colour of chunks whose mesh is not empty.
     pub drawn: Color,
-    /// The colour of chunks that are still to be filled or meshed.
+    /// The colour of chunks that wait to be filled or meshed.
     pub waiting: Color,
-    /// The colour of chunks without a surface: a small cube in the middle of each.
+    /// The colour of chunks without a surface, drawn as a small cube in the middle of each.
     pub empty: Color,
-    /// The colour of the whole terrain's bounds, where it is not endless.
+    /// The colour of the whole terrain's bounds, if it is not endless.
     pub terrain: Color,
 }
 
@@ -48,12 +48,12 @@ impl Default for ChunkBoundsGizmos {
 
 /// How far inside a chunk its bounds are drawn, so that neighbours' lines do not cover each other. [Units: voxels]
 const INSET: f32 = 0.25;
-/// The edge of an empty chunk's cube, as a share of the chunk's.
+/// The edge of an empty chunk's cube, as a share of the chunk's edge.
 const EMPTY_SHARE: f32 = 0.06;
-/// A terrain with more chunks along an axis has no bounds to draw.
+/// The bounds of a terrain with more chunks than this along an axis are not drawn.
 const ENDLESS: u32 = 1 << 16;
 
-/// Draws the bounds of chunks where [`ShowChunkBounds`] says so.
+/// Draws the bounds of chunks while [`ShowChunkBounds`] is true.
 ///
 /// Needs Bevy's `GizmoPlugin`, added before or after; without it, nothing is drawn.
 #[derive(Default)]
@@ -91,7 +91,7 @@ fn draw_drawn(
     }
 }
 
-/// Draws chunks that have no entity.
+/// Draws chunks without an entity: waiting and empty ones.
 fn draw_others(volumes: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos: Gizmos<ChunkBoundsGizmos>) {
     let (waiting, empty) = (gizmos.config_ext.waiting, gizmos.config_ext.empty);
     for (volume, to_world) in &volumes {
@@ -124,7 +124,7 @@ fn draw_terrains(terrains: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos
     }
 }
 
-/// The box of a chunk of so many cells, in voxels from its corner.
+/// The box that is drawn for a chunk of `cells` cells per axis, in voxels from its lowest corner.
 fn inset(cells: u32) -> Aabb3d {
     Aabb3d::from_min_max(Vec3::splat(INSET), Vec3::splat(cells as f32 - INSET))
 }

@@ -11,17 +11,17 @@ use super::{SourceError, check, check_length};
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Fractal {
-    /// Another seed, another world.
+    /// The seed; each seed gives different noise. Default: 0.
     pub seed: u32,
-    /// How many octaves are added up. Limit: 1..=16. Default: 5.
+    /// The number of octaves. Limit: 1..=16. Default: 5.
     pub octaves: u32,
     /// The size of the largest features. Units: world. Limit: > 0. Default: 120.
     pub zoom: f64,
-    /// How strong each octave is, as a share of the one before. Limit: > 0, <= 1. Default: 0.45.
+    /// The amplitude of each octave, as a share of the one before. Limit: > 0, <= 1. Default: 0.45.
     pub persistence: f64,
-    /// How many times finer each octave is than the one before. Limit: 1..=8. Default: 2.
+    /// The frequency of each octave, as a multiple of the one before. Limit: 1..=8. Default: 2.
     pub lacunarity: f64,
-    /// Folds the noise, so that it has sharp ridges of 1 where it otherwise passes through 0. Default: false.
+    /// Folds the noise: it has sharp ridges with the value 1 where it would pass through 0. Default: false.
     pub ridged: bool,
 }
 
@@ -32,7 +32,7 @@ impl Default for Fractal {
 }
 
 impl Fractal {
-    /// Says what is wrong with the settings, if anything is.
+    /// Checks the settings.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.

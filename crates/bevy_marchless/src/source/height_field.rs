@@ -18,20 +18,21 @@ pub(crate) trait HeightField {
     fn range(&self, x: [f64; 2], z: [f64; 2]) -> [f64; 2];
 }
 
-/// The ground of one column.
+/// The ground in one column.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Column {
-    /// World units.
+    /// The height of the ground. [Units: world]
     pub(crate) height: f64,
-    /// Rise per run, 0 or more.
+    /// The slope of the ground. [Units: rise per run] [Limit: >= 0]
     #[cfg(feature = "png")]
     pub(crate) slope: f64,
-    /// How much of the way out of the ground leads up: what heights above it are multiplied with.
+    /// The y part of the ground's unit normal: the factor from heights above the ground to distances.
     pub(crate) up: f64,
 }
 
 impl Column {
-    /// Of the heights of the columns before and behind it, along x and z, `run` world units apart from each other.
+    /// A column, with its slope from the heights of its neighbours along x and z. `run`: the distance between the two
+    /// neighbours of an axis, in world units.
     pub(crate) fn new(height: f64, along_x: [f64; 2], along_z: [f64; 2], run: f64) -> Self {
         let [x, z] = [along_x, along_z].map(|[before, behind]| (behind - before) / run);
         let square = x * x + z * z;
@@ -43,15 +44,15 @@ impl Column {
         }
     }
 
-    /// The distance to the ground of a point `above` world units over it, taking the ground for a slope that goes on.
+    /// The distance to the ground from a point `above` world units over it, as if the ground were a plane.
     pub(crate) fn distance(self, above: f64) -> f64 {
         above * self.up
     }
 }
 
 #[cfg(feature = "png")]
-/// The ground of each column of a region, x fastest. Each height is evaluated once; slopes are central differences, and
-/// so depend on nothing but the column's position and the spacing.
+/// The ground in each column of a region, x fastest. Each height is evaluated once. Slopes are central differences, so
+/// they depend only on the column's position and the spacing.
 pub(crate) fn columns(field: &impl HeightField, region: &SourceRegion) -> Vec<Column> {
     let [nx, _, nz] = region.size.map(|points| points as usize);
     let at = |axis: usize, index: usize| (f64::from(region.min[axis]) + index as f64 - 1.0) * region.spacing;
@@ -97,10 +98,10 @@ pub(crate) fn fill(
 pub(crate) fn bound(field: &impl HeightField, strata: &[Stratum], region: &SourceRegion) -> Bound {
     let [x, [bottom, top], z] = world_box(region);
     let [lowest, highest] = field.range(x, z);
-    let room = BOUND_MARGIN * region.spacing;
-    if bottom > highest + room {
+    let margin = BOUND_MARGIN * region.spacing;
+    if bottom > highest + margin {
         Bound::Outside
-    } else if top < lowest - room
+    } else if top < lowest - margin
         && let Some(material) = material_within(strata, [lowest - top, highest - bottom], [bottom, top])
     {
         Bound::Inside { material }

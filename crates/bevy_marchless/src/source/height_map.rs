@@ -26,12 +26,12 @@ pub struct HeightMapSettings {
     pub metres_per_pixel: DVec2,
     /// Metres of height per unit of the samples. Limit: > 0. Default: 1.
     pub metres_per_unit: f64,
-    /// How many times higher than it is the ground is drawn. Limit: > 0. Default: 1.
+    /// The factor that heights are multiplied with, on top of `metres_per_unit`. Limit: > 0. Default: 1.
     pub exaggeration: f64,
-    /// The height of the lowest sample above the terrain's lowest corner, so that there is something to dig into.
-    /// Units: world. Default: none, eight of the default voxels.
+    /// The height of the lowest sample above the terrain's lowest corner, which leaves ground to dig into.
+    /// Units: world. Default: `None`, which is eight voxels of the default size.
     pub floor: Option<f64>,
-    /// The ground's materials. Default: none, material 0 throughout.
+    /// The rules for the ground's materials. Default: none, so all ground has material 0.
     pub strata: Vec<Stratum>,
 }
 
@@ -42,7 +42,7 @@ impl Default for HeightMapSettings {
 }
 
 impl HeightMapSettings {
-    /// Says what is wrong with the settings, if anything is. What they make of a picture may still reach too far.
+    /// Checks the settings alone. With a picture, the ground may still exceed the limits of a map.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -56,30 +56,32 @@ impl HeightMapSettings {
     }
 }
 
-/// Ground whose heights are samples in a grid, bicubic (Catmull–Rom) between them.
+/// Ground whose heights are samples in a grid, with bicubic (Catmull–Rom) interpolation between them.
 ///
-/// The picture's left edge lies at x = 0, its top edge at z = 0; each sample stands in the middle of its pixel, and
-/// beyond the picture the heights of its border go on. So north is −z where it is the picture's top.
+/// The picture's left edge lies at x = 0, its top edge at z = 0. Each sample lies in the middle of its pixel. Beyond
+/// the picture, the heights of its border continue. So north is −z if it is the top of the picture.
 #[derive(Clone, PartialEq, Reflect)]
 #[reflect(opaque)]
 pub struct HeightMap {
     size: [u32; 2],
     samples: Arc<[u16]>,
     settings: HeightMapSettings,
-    /// The lowest and the highest sample.
+    /// The lowest sample.
     lowest: u16,
+    /// The highest sample.
     highest: u16,
+    /// The height of the lowest sample. [Units: world]
     floor: f64,
 }
 
 impl HeightMap {
-    /// The longer side of a map is about this many voxels of its default size.
+    /// The length of a map's longer side in voxels of the default size.
     const DEFAULT_VOXELS: f64 = 512.0;
 
     /// Reads a 16-bit greyscale PNG file.
     ///
     /// # Errors
-    /// [`HeightMapError`] for a file that cannot be read, is no such picture or is cut short, and for settings that
+    /// [`HeightMapError`] for a file that cannot be read, is not such a picture or is cut short, and for settings that
     /// are out of range.
     pub fn from_path(path: impl AsRef<Path>, settings: HeightMapSettings) -> Result<Self, HeightMapError> {
         let path = path.as_ref();
@@ -104,12 +106,13 @@ impl HeightMap {
         Self::from_samples(size, samples, settings)
     }
 
-    /// A map of samples in units of [`HeightMapSettings::metres_per_unit`].
+    /// A map from samples in units of [`HeightMapSettings::metres_per_unit`].
     ///
     /// `size`: samples along x and z. `samples`: `[nx·nz]`, x fastest.
     ///
     /// # Errors
-    /// [`HeightMapError`] for a size of zero, another number of samples, and settings that are out of range.
+    /// [`HeightMapError`] for a size of zero, for a number of samples that does not match it, and for settings that are
+    /// out of range.
     pub fn from_samples(
         size: [u32; 2],
         samples: Vec<u16>,
@@ -128,7 +131,7 @@ impl HeightMap {
             .map_err(HeightMapError::from)
     }
 
-    /// The same samples as another ground; they are shared, not copied.
+    /// The map with other settings. Samples are shared, not copied.
     ///
     /// # Errors
     /// [`SourceError`] for settings that are out of range.
@@ -141,17 +144,17 @@ impl HeightMap {
         Ok(map)
     }
 
-    /// How the samples become ground.
+    /// The settings that turn samples into ground.
     pub fn settings(&self) -> &HeightMapSettings {
         &self.settings
     }
 
-    /// Samples along x and z.
+    /// The number of samples along x and z.
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
-    /// How far the map reaches along x and z. Units: world.
+    /// The map's size along x and z. Units: world.
     pub fn size_in_world(&self) -> DVec2 {
         DVec2::new(f64::from(self.size[0]), f64::from(self.size[1])) * self.settings.metres_per_pixel
     }
@@ -161,7 +164,7 @@ impl HeightMap {
         self.floor
     }
 
-    /// The height of the highest sample; between samples the ground may rise a little more. Units: world.
+    /// The height of the highest sample; the ground between samples may be slightly higher. Units: world.
     pub fn max_height(&self) -> f64 {
         self.world_height(f64::from(self.highest))
     }
@@ -179,11 +182,12 @@ impl HeightMap {
         self.size_in_world().max_element() / Self::DEFAULT_VOXELS
     }
 
-    /// How many chunks of `chunk_cells` voxels of `voxel_size` world units hold the whole map, with eight voxels of air
-    /// above its highest sample.
+    /// The number of chunks per axis that hold the whole map, with eight voxels of air above its highest sample.
+    ///
+    /// `voxel_size`: in world units. `chunk_cells`: voxels per axis of a chunk.
     ///
     /// # Errors
-    /// [`SourceError::Setting`] for a voxel size that is not positive or a chunk of no voxels.
+    /// [`SourceError::Setting`] for a voxel size that is not positive, or for chunks without voxels.
     pub fn extent_in_chunks(&self, voxel_size: f64, chunk_cells: u32) -> Result<UVec3, SourceError> {
         check_length("the voxel size", voxel_size)?;
         check("the number of voxels along a chunk", "at least 1", f64::from(chunk_cells), |v| v >= 1.0)?;
@@ -192,14 +196,14 @@ impl HeightMap {
         Ok(UVec3::new(chunks(size.x), chunks(self.max_height() + 8.0 * voxel_size), chunks(size.y)))
     }
 
-    /// A position in pixels, where whole numbers are samples.
+    /// Converts a world position to pixels; samples lie at whole numbers.
     fn in_pixels(&self, x: f64, z: f64) -> [f64; 2] {
         let [x, z] = [x / self.settings.metres_per_pixel.x - 0.5, z / self.settings.metres_per_pixel.y - 0.5];
-        // Beyond the border all samples are the same.
+        // Farther beyond the border, interpolation sees only copies of the border's sample.
         [x.clamp(-2.0, f64::from(self.size[0]) + 1.0), z.clamp(-2.0, f64::from(self.size[1]) + 1.0)]
     }
 
-    /// A sample; beyond the border, the nearest one.
+    /// The sample of a pixel; beyond the border, the nearest one.
     fn sample(&self, x: i64, z: i64) -> f64 {
         let [x, z] = [(x, self.size[0]), (z, self.size[1])].map(|(v, size)| v.clamp(0, i64::from(size) - 1) as usize);
         f64::from(self.samples[x + self.size[0] as usize * z])
@@ -217,7 +221,7 @@ impl fmt::Debug for HeightMap {
     }
 }
 
-/// The first of four samples around a position in pixels, and the weight of each.
+/// The first of the four samples around a position in pixels along one axis, and the weights of all four.
 fn catmull_rom(position: f64) -> (i64, [f64; 4]) {
     let whole = position.floor();
     let t = position - whole;
@@ -226,8 +230,10 @@ fn catmull_rom(position: f64) -> (i64, [f64; 4]) {
     (whole as i64 - 1, weights)
 }
 
-/// The sum of the negative weights of bicubic interpolation is never below −9/32: along one axis it is −1/8 at most,
-/// half-way, where the positive ones add up to 9/8; 2 · 1/8 · 9/8 for two axes.
+/// The greatest overshoot of bicubic interpolation, as a share of the range of the samples.
+///
+/// It is the greatest sum of negative weights. Along one axis that is 1/8, half-way between samples, where the positive
+/// weights add up to 9/8. Two axes give 2 · 1/8 · 9/8.
 const OVERSHOOT: f64 = 9.0 / 32.0;
 
 impl HeightField for HeightMap {
@@ -238,7 +244,7 @@ impl HeightField for HeightMap {
     fn range(&self, x: [f64; 2], z: [f64; 2]) -> [f64; 2] {
         let [x, z] = {
             let [low, high] = [0, 1].map(|end| self.in_pixels(x[end], z[end]));
-            // All samples that have a weight, and one more for roundings.
+            // All samples with a weight, and one more on each side for rounding.
             let clamped = |v: i64, size: u32| v.clamp(0, i64::from(size) - 1) as usize;
             [0, 1].map(|axis| {
                 clamped(low[axis].floor() as i64 - 2, self.size[axis])
@@ -262,33 +268,33 @@ impl Source for HeightMap {
     }
 }
 
-/// Why a file, or samples, are not a [`HeightMap`].
+/// An error in the file or the samples of a [`HeightMap`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum HeightMapError {
     /// The file could not be opened.
     #[error("the height map {} cannot be opened: {error}", path.display())]
     Open {
-        /// Which file.
+        /// The file's path.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         error: io::Error,
     },
     /// The bytes are not a PNG picture, or a damaged one.
     #[error("a height map must be a PNG picture, but this is not one: {0}")]
     NotPng(DecodingError),
-    /// The picture has another number of bits or colours.
+    /// The picture is not 16-bit greyscale.
     #[error("a height map must be 16-bit grey, but this picture is {bits}-bit {color}")]
     NotGrey16 {
         /// Bits per channel.
         bits: u8,
-        /// Which channels there are.
+        /// The picture's channels.
         color: &'static str,
     },
     /// The file ends before the picture does.
     #[error("the height map of {} × {} samples is cut short: its file ends before the picture does", size[0], size[1])]
     CutShort {
-        /// The size it claims.
+        /// The size in the file's header: samples along x and z.
         size: [u32; 2],
     },
     /// The picture could not be read to its end.
@@ -300,20 +306,20 @@ pub enum HeightMapError {
         /// Samples along x and z.
         size: [u32; 2],
     },
-    /// There are more samples than fit.
+    /// There are more than 2²⁸ samples.
     #[error("a height map of {} × {} samples is larger than {} samples", size[0], size[1], MOST_SAMPLES)]
     TooLarge {
         /// Samples along x and z.
         size: [u32; 2],
     },
-    /// The samples do not fill the size.
+    /// The number of samples does not match the size.
     #[error("a height map of {} × {} samples needs {expected} of them, but there are {found}", size[0], size[1])]
     SampleCount {
         /// Samples along x and z.
         size: [u32; 2],
-        /// Their product.
+        /// The number of samples that the size needs.
         expected: u64,
-        /// How many there are.
+        /// The number of samples that were given.
         found: usize,
     },
     /// A setting is out of range.
@@ -321,10 +327,10 @@ pub enum HeightMapError {
     Setting(#[from] SourceError),
 }
 
-/// As many as 16,384 × 16,384: half a gigabyte.
+/// The most samples of a map: 16,384 × 16,384, or half a gigabyte.
 const MOST_SAMPLES: usize = 1 << 28;
 
-/// Size and samples of a 16-bit greyscale PNG picture.
+/// Reads the size and samples of a 16-bit greyscale PNG picture.
 fn decode(reader: impl BufRead + Seek) -> Result<([u32; 2], Vec<u16>), HeightMapError> {
     let mut reader = png::Decoder::new(reader).read_info().map_err(HeightMapError::NotPng)?;
     let info = reader.info();

@@ -1,4 +1,4 @@
-//! [`Interval`]: two numbers between which others lie.
+//! [`Interval`]: interval arithmetic for bounds.
 
 /// All numbers from `low` to `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +14,7 @@ impl Interval {
         Self { low: value, high: value }
     }
 
-    /// The smallest one that holds all values.
+    /// The smallest interval that holds all values.
     pub(crate) fn of(values: impl IntoIterator<Item = f64>) -> Self {
         values.into_iter().fold(Self::NOTHING, |so_far, value| Self {
             low: if value < so_far.low { value } else { so_far.low },
@@ -49,27 +49,27 @@ impl Interval {
         }
     }
 
-    /// Where the smaller of two numbers lies.
+    /// The interval of the smaller of two numbers.
     pub(crate) fn min(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.min(other.high) }
     }
 
-    /// Where the larger of two numbers lies.
+    /// The interval of the larger of two numbers.
     pub(crate) fn max(self, other: Self) -> Self {
         Self { low: self.low.max(other.low), high: self.high.max(other.high) }
     }
 
-    /// Both ends brought into another.
+    /// The interval with both ends clamped to another.
     pub(crate) fn within(self, other: Self) -> Self {
         self.max(Self::exactly(other.low)).min(Self::exactly(other.high))
     }
 
-    /// What a function that never falls makes of it.
+    /// The image of the interval under a monotonically rising function.
     pub(crate) fn through(self, rising: impl Fn(f64) -> f64) -> Self {
         Self { low: rising(self.low), high: rising(self.high) }
     }
 
-    /// A little more to both sides, for roundings: a share of the larger end.
+    /// The interval widened on both sides, for rounding: by a share of the larger absolute end.
     pub(crate) fn widened(self, share: f64) -> Self {
         let more = share * self.low.abs().max(self.high.abs());
         Self { low: self.low - more, high: self.high + more }

@@ -1,16 +1,16 @@
-//! [`Lipschitz`]: a formula that is known to change no faster than so and so, which bounds it.
+//! [`Lipschitz`]: a formula with a known Lipschitz constant, which gives bounds.
 
 use bevy_math::DVec3;
 use marchless::{Bound, Source, SourceRegion};
 
 use super::{BOUND_MARGIN, world_box};
 
-/// A formula with a bound: wherever it is evaluated, it changes by at most `constant` per world unit.
+/// A formula with a Lipschitz constant: it changes by at most `constant` per world unit.
 ///
-/// From one value in the middle of a region it follows then that there is no surface in it, and chunks far from the
-/// surface are neither sampled nor stored. True signed distances have the constant 1. Sums of formulas have the sum of
-/// their constants, minima and maxima the larger one. Heights, `y - h(x, z)`, have √(1 + s²), where s is the steepest
-/// slope. A constant that is too small leaves holes; one that is too large only skips less.
+/// One value in the middle of a region then bounds the values in all of it. So chunks far from the surface are neither
+/// sampled nor stored. A true signed distance has the constant 1. A sum of formulas has the sum of their constants, a
+/// minimum or maximum the larger one. A height field, `y - h(x, z)`, has √(1 + s²), where s is the steepest slope. A
+/// constant that is too small leaves holes; one that is too large only skips fewer chunks.
 ///
 /// ```
 /// use bevy_marchless::source::{Bound, Lipschitz, Source, SourceRegion};
@@ -24,9 +24,9 @@ use super::{BOUND_MARGIN, world_box};
 /// assert_eq!(source.bound(&region), Bound::Outside);
 /// ```
 ///
-/// What a formula cannot bound in this way, an own [`Source`] can: its `bound` must be true for all samples of the region
-/// and cheap, about as much as one sample. Its `bound_closely` may look closer, at a layer of samples, say; it has to
-/// leave out three voxels on both sides of the surface as well.
+/// For a formula that needs other bounds, implement [`Source`]. Its `bound` must hold for all samples of the region,
+/// and be cheap, about as much as one sample. Its `bound_closely` may cost more, about as much as a layer of samples.
+/// It must also keep a margin of three voxels on both sides of the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Lipschitz<F> {
     field: F,
@@ -34,8 +34,10 @@ pub struct Lipschitz<F> {
 }
 
 impl<F: Fn([f64; 3]) -> f64 + Send + Sync + 'static> Lipschitz<F> {
-    /// `field`: world position (terrain space) to signed distance in world units. `constant`: how much it changes per
-    /// world unit at most; one that is negative or not a number bounds nothing.
+    /// A source from a formula.
+    ///
+    /// `field`: from a world position (terrain space) to a signed distance in world units. `constant`: its greatest
+    /// change per world unit; one that is negative or NaN bounds nothing.
     pub fn new(field: F, constant: f64) -> Self {
         Self { field, constant }
     }
@@ -63,7 +65,7 @@ impl<F: Fn([f64; 3]) -> f64 + Send + Sync + 'static> Source for Lipschitz<F> {
     }
 
     fn bound_closely(&self, region: &SourceRegion) -> Bound {
-        // With room around it already.
+        // This bound already includes the margin of distance.
         self.bound(region)
     }
 }

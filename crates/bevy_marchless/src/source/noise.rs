@@ -1,4 +1,4 @@
-//! Hills and caves of fractal noise: the two simplest landscapes.
+//! [`NoiseHeights`] and [`NoiseDensity`]: hills and caves of fractal noise, the two simplest landscapes.
 
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
@@ -10,20 +10,20 @@ use super::{
     check_position,
 };
 
-/// What [`NoiseHeights`] are made of.
+/// The settings of [`NoiseHeights`].
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct NoiseHeightsSettings {
     /// The noise; its `zoom` is about the distance between hills.
     pub noise: Fractal,
-    /// The height in the middle between the highest and the lowest possible. [Units: world, from the terrain's lowest
-    /// corner] Default: 56.
+    /// The height half-way between the highest and the lowest possible. Units: world, from the terrain's lowest corner.
+    /// Default: 56.
     pub base: f64,
-    /// How far heights reach above and below the base at most. Units: world. Limit: >= 0. Default: 52.
+    /// The greatest height above and below the base. Units: world. Limit: >= 0. Default: 52.
     pub amplitude: f64,
-    /// The ground's materials. [Default: material 2 from 3.5 units of depth and where it is steeper than 1, material 1
-    /// from 1.5 units of depth, and 0 on top]
+    /// The rules for the ground's materials. Default: material 2 from 3.5 units of depth and where the ground is at
+    /// least as steep as 1, material 1 from 1.5 units of depth, and 0 on top.
     pub strata: Vec<Stratum>,
 }
 
@@ -34,7 +34,7 @@ impl Default for NoiseHeightsSettings {
 }
 
 impl NoiseHeightsSettings {
-    /// Says what is wrong with the settings, if anything is.
+    /// Checks the settings.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -56,7 +56,8 @@ pub(crate) fn default_strata() -> Vec<Stratum> {
 
 /// Hills: the height of the ground is fractal noise, evaluated once per column.
 ///
-/// It is the [`Landscape`] whose ground is the base and the noise. Clones share the heights that were evaluated already.
+/// It is the [`Landscape`] whose ground is the base plus the noise. Clones share the heights that were evaluated
+/// already.
 #[derive(Clone, Debug, Reflect)]
 #[reflect(opaque)]
 pub struct NoiseHeights {
@@ -65,14 +66,14 @@ pub struct NoiseHeights {
 }
 
 impl NoiseHeightsSettings {
-    /// The same as a part of a landscape.
+    /// The hills as a part of a landscape.
     fn solid(&self) -> Solid {
         Solid::Ground(self.base + Layer::noise(self.noise, self.amplitude))
     }
 }
 
 impl NoiseHeights {
-    /// Hills of these settings.
+    /// Hills with these settings.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -85,13 +86,13 @@ impl NoiseHeights {
         Self { landscape: landscape(settings.solid(), &settings.strata), settings }
     }
 
-    /// Hills of the default settings, but of another seed.
+    /// Hills with the default settings and this seed.
     pub fn from_seed(seed: u32) -> Self {
         let noise = Fractal { seed, ..Fractal::default() };
         Self::of_valid(NoiseHeightsSettings { noise, ..NoiseHeightsSettings::default() })
     }
 
-    /// What the hills are made of.
+    /// The settings of the hills.
     pub fn settings(&self) -> &NoiseHeightsSettings {
         &self.settings
     }
@@ -101,7 +102,7 @@ impl NoiseHeights {
         self.landscape.height(x, z).unwrap_or(self.settings.base)
     }
 
-    /// How often noise was evaluated so far, as of [`Landscape::noise_calls`].
+    /// The number of noise evaluations so far; see [`Landscape::noise_calls`].
     #[doc(hidden)]
     pub fn noise_calls(&self) -> u64 {
         self.landscape.noise_calls()
@@ -133,20 +134,20 @@ impl Source for NoiseHeights {
     }
 }
 
-/// What a [`NoiseDensity`] is made of.
+/// The settings of [`NoiseDensity`].
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct NoiseDensitySettings {
     /// The noise; its `zoom` is about the distance between caves.
     pub noise: Fractal,
-    /// There is ground where the noise is below this: at −1 none, at 0 in half of the space, at 1 in all of it.
+    /// The noise value below which there is ground: −1 gives no ground, 0 half of the space, 1 all of it.
     /// Default: 0.15.
     pub threshold: f64,
-    /// Hills above which there is only air; their strata are not used. Default: none, ground in all directions.
+    /// Hills above which there is only air; their strata are not used. Default: `None`, ground in all directions.
     pub ground: Option<NoiseHeightsSettings>,
-    /// The ground's materials. Depth is the estimated distance to the nearest surface, a cave's too.
-    /// Default: as of [`NoiseHeightsSettings::strata`].
+    /// The rules for the ground's materials. Depth is the estimated distance to the nearest surface, including those of
+    /// caves. Default: that of [`NoiseHeightsSettings::strata`].
     pub strata: Vec<Stratum>,
 }
 
@@ -157,10 +158,10 @@ impl Default for NoiseDensitySettings {
     }
 }
 
-/// Caves and overhangs: there is ground where 3-D noise is below a threshold and, if wished, below the surface of hills.
+/// Caves and overhangs: ground where 3-D noise is below a threshold, optionally only below the surface of hills.
 ///
-/// The noise is evaluated once per sample, but not above the hills; distances are estimated from its gradient. It is the
-/// [`Landscape`] of hills from which [`Caves`] are subtracted; take that for caves with a coarser lattice.
+/// The noise is evaluated once per sample, but not above the hills. Distances are estimated from its gradient. It is
+/// the [`Landscape`] of hills with [`Caves`] subtracted; use that for caves with a coarser lattice.
 #[derive(Clone, Debug, Reflect)]
 #[reflect(opaque)]
 pub struct NoiseDensity {
@@ -169,7 +170,7 @@ pub struct NoiseDensity {
 }
 
 impl NoiseDensity {
-    /// Caves of these settings.
+    /// Caves with these settings.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -187,12 +188,12 @@ impl NoiseDensity {
         Self { landscape: landscape(ground.subtraction(caves), strata), settings }
     }
 
-    /// What it is made of.
+    /// The settings of the caves.
     pub fn settings(&self) -> &NoiseDensitySettings {
         &self.settings
     }
 
-    /// How often noise was evaluated so far, as of [`Landscape::noise_calls`].
+    /// The number of noise evaluations so far; see [`Landscape::noise_calls`].
     #[doc(hidden)]
     pub fn noise_calls(&self) -> u64 {
         self.landscape.noise_calls()

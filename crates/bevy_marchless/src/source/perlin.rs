@@ -1,8 +1,8 @@
 //! [`Perlin`]: the `noise` crate's Perlin noise, a row at a time and with its gradient.
 //!
-//! Along a row only x changes. What the lattice points of one x add to a row is a straight line, worked out once: what is
-//! left for a sample are two such lines and a fade between them, without branches or look-ups. Places are told in `f64`,
-//! and what lies within a cell of the lattice, in three dimensions, in `f32`. The values are those of
+//! Along a row only x changes. What the lattice points of one x add to a row is a straight line, worked out once: what
+//! is left for a sample are two such lines and a fade between them, without branches or look-ups. Places are told in
+//! `f64`, and what lies within a cell of the lattice, in three dimensions, in `f32`. The values are those of
 //! [`noise::Perlin`](::noise::Perlin), but for roundings.
 
 use core::f64::consts::SQRT_2;
@@ -284,8 +284,8 @@ fn add<const RIDGED: bool>(
     }
 }
 
-/// Passes on each run of coordinates (ascending) that lie in one cell: the cell's lowest coordinate, the run, and what `side` makes
-/// of the lattice points, modulo 256, at both ends of the cell.
+/// Passes on each run of coordinates (ascending) that lie in one cell: the cell's lowest coordinate, the run, and what
+/// `side` makes of the lattice points, modulo 256, at both ends of the cell.
 #[inline]
 fn for_each_cell<T: Copy>(
     xs: &[f64],
