@@ -186,7 +186,8 @@ impl Source for Landscape {
         let mut rules = self.compiled.rules.for_rows(&xs);
         for (index, distances, materials) in rows(samples, distances, materials) {
             let [_, y, z] = samples.position([0, index[0], index[1]]);
-            let line = Line { index, xs: &xs, y, z, room: region.room() as f32, reach: region.reach as f32 };
+            let line =
+                Line { index, xs: &xs, y, z, cut_margin: region.cut_margin() as f32, reach: region.reach as f32 };
             body.evaluate(&line, 0..width, &mut row, &mut calls);
             for (distance, sample) in distances.iter_mut().zip(&row.distance) {
                 *distance = (sample / spacing).clamp(f32::MIN, f32::MAX);

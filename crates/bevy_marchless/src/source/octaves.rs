@@ -1,10 +1,10 @@
-//! [`Octaves`]: a [`Fractal`] ready to be evaluated, in rows, and bounded.
+//! [`Octaves`]: a [`Fractal`] prepared for evaluation in rows and for bounds.
 
 use super::Fractal;
 use super::interval::Interval;
 use super::perlin::{LIPSCHITZ_2D, LIPSCHITZ_3D, NoiseRow, NoiseScale, Perlin};
 
-/// The noise may be as far off, for it is rounded to `f32`.
+/// The greatest error of noise from rounding to `f32`.
 const ROUNDING: f64 = 1e-6;
 
 /// One octave of a [`Fractal`].
@@ -16,8 +16,8 @@ struct Octave {
     offset: f64,
 }
 
-/// A [`Fractal`] ready to be evaluated. Functions that evaluate noise return how often they did: once an octave and
-/// point.
+/// A [`Fractal`] prepared for evaluation. Functions that evaluate noise return the number of evaluations, one per
+/// octave and point.
 #[derive(Clone)]
 pub(crate) struct Octaves {
     octaves: Vec<Octave>,
@@ -25,7 +25,7 @@ pub(crate) struct Octaves {
 }
 
 impl Octaves {
-    /// Of settings that are valid.
+    /// Prepares noise with valid settings.
     pub(crate) fn new(settings: &Fractal) -> Self {
         let amplitudes = |index: u32| settings.persistence.powi(index as i32);
         let sum: f64 = (0..settings.octaves).map(amplitudes).sum();
@@ -39,7 +39,7 @@ impl Octaves {
         Self { octaves: (0..settings.octaves).map(octave).collect(), ridged: settings.ridged }
     }
 
-    /// Noise, from −1 to 1, at each x of a row at `z`. `values`: one for each x.
+    /// Writes noise, from −1 to 1, for each x of a row at `z`. `values`: one for each x.
     pub(crate) fn row_2d(&self, xs: &[f64], z: f64, values: &mut [f64]) -> u64 {
         values.fill(0.0);
         let mut places = vec![0.0; xs.len()];
@@ -52,7 +52,7 @@ impl Octaves {
         self.calls(xs.len())
     }
 
-    /// Noise, from −1 to 1, at each x with its z: the same bits as in a row.
+    /// Writes noise, from −1 to 1, for each x with its z. Values are bit for bit those of [`row_2d`](Self::row_2d).
     pub(crate) fn points_2d(&self, xs: &[f64], zs: &[f64], values: &mut [f64]) -> u64 {
         for ((x, z), sum) in xs.iter().zip(zs).zip(values) {
             *sum = 0.0;
@@ -65,7 +65,7 @@ impl Octaves {
         self.calls(xs.len())
     }
 
-    /// Noise, from −1 to 1, and its gradient per world unit at each x of a row at `y`, `z`.
+    /// Writes noise, from −1 to 1, and its gradient per world unit for each x of a row at `y`, `z`.
     pub(crate) fn row_3d(&self, xs: &[f64], y: f64, z: f64, row: &mut NoiseRow) -> u64 {
         row.reset(xs.len());
         for octave in &self.octaves {
@@ -80,8 +80,8 @@ impl Octaves {
         self.calls(xs.len())
     }
 
-    /// Between which values the noise lies within `radius` of a place, given by two or three coordinates, by evaluating
-    /// it there alone.
+    /// The interval of the noise within `radius` of a place, given by two or three coordinates. Evaluates the noise
+    /// only at the place itself.
     pub(crate) fn around<const N: usize>(&self, place: [f64; N], radius: f64) -> (Interval, u64) {
         let mut sum = Interval::exactly(0.0);
         let lipschitz = if N == 2 { LIPSCHITZ_2D } else { LIPSCHITZ_3D };
@@ -89,7 +89,7 @@ impl Octaves {
         for octave in &self.octaves {
             let change = lipschitz * octave.frequency * radius;
             let all = Interval { low: -1.0, high: 1.0 };
-            // Not worth the evaluation where it can hardly say more than that.
+            // Above this, an evaluation would hardly narrow the interval.
             let values = if change < 1.5 {
                 calls += 1;
                 let mut value = 0.0;
@@ -111,22 +111,22 @@ impl Octaves {
         (Interval { low: sum.low - ROUNDING, high: sum.high + ROUNDING }, calls)
     }
 
-    /// Between which values the noise lies everywhere.
+    /// The interval of the noise over all of space.
     pub(crate) fn range(&self) -> Interval {
         Interval { low: -1.0 - ROUNDING, high: 1.0 + ROUNDING }
     }
 
-    /// How much the noise typically changes per world unit.
+    /// The typical change of the noise per world unit.
     pub(crate) fn typical_gradient(&self) -> f64 {
         self.octaves.iter().map(|octave| (octave.amplitude * octave.frequency).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// How much the noise changes per world unit at most, in two dimensions.
+    /// The greatest change of the noise per world unit, in two dimensions.
     pub(crate) fn lipschitz_2d(&self) -> f64 {
         self.steepness() * LIPSCHITZ_2D
     }
 
-    /// As [`lipschitz_2d`](Self::lipschitz_2d), in three dimensions.
+    /// The greatest change of the noise per world unit, in three dimensions.
     pub(crate) fn lipschitz_3d(&self) -> f64 {
         self.steepness() * LIPSCHITZ_3D
     }
@@ -142,7 +142,7 @@ impl Octaves {
 }
 
 impl Octave {
-    /// A world coordinate in this octave's lattice.
+    /// Converts a world coordinate to this octave's lattice.
     fn place(&self, coordinate: f64) -> f64 {
         coordinate * self.frequency + self.offset
     }

@@ -1,4 +1,4 @@
-//! [`Perlin`]: the `noise` crate's Perlin noise, a row at a time and with its gradient.
+//! [`Perlin`]: the Perlin noise of the crate `noise`, a row at a time and with its gradient.
 //!
 //! Along a row only x changes. What the lattice points of one x add to a row is a straight line, worked out once: what
 //! is left for a sample are two such lines and a fade between them, without branches or look-ups. Places are told in
@@ -9,17 +9,20 @@ use core::f64::consts::SQRT_2;
 
 use ::noise::permutationtable::{NoiseHasher, PermutationTable};
 
-/// The noise changes at most this fast, per unit of its lattice: in two dimensions 2.75·√2, in three 3.75·2/√3, next to
-/// a corner between cells whose gradients point apart. A test finds them again; a hundredth is added.
+/// The greatest change of the noise per unit of its lattice, in two dimensions.
+///
+/// It is 2.75·√2 in two dimensions and 3.75·2/√3 in three, next to a corner between cells whose gradients point apart.
+/// A test derives both again. One hundredth is added.
 pub(crate) const LIPSCHITZ_2D: f64 = 1.01 * 2.75 * SCALE_2D;
-/// As [`LIPSCHITZ_2D`], in three dimensions.
+/// The greatest change of the noise per unit of its lattice, in three dimensions; see [`LIPSCHITZ_2D`].
 pub(crate) const LIPSCHITZ_3D: f64 = 1.01 * 3.75 * SCALE_3D;
 
-/// What brings the noise to −1..=1.
+/// The factor that scales 2-D noise to −1..=1.
 const SCALE_2D: f64 = SQRT_2;
+/// The factor that scales 3-D noise to −1..=1.
 const SCALE_3D: f64 = 1.154_700_538_379_251_5;
 
-/// Gradients of lattice points, by the last four bits of their hash.
+/// The gradients of lattice points, by the last four bits of their hash.
 const GRADIENTS_3D: [[f64; 3]; 16] = [
     [1.0, 1.0, 0.0],
     [-1.0, 1.0, 0.0],
@@ -39,17 +42,20 @@ const GRADIENTS_3D: [[f64; 3]; 16] = [
     [0.0, -1.0, -1.0],
 ];
 
-/// Perlin noise of one seed.
+/// Perlin noise with one seed.
 #[derive(Clone)]
 pub(crate) struct Perlin {
     table: [u8; 256],
 }
 
-/// A coordinate: the lowest lattice point of its cell, the same modulo 256, and how far behind it.
+/// A coordinate, split into its cell and its place in it.
 #[derive(Clone, Copy)]
 struct LatticeCoordinate {
+    /// The lowest lattice point of the cell.
     cell: f64,
+    /// That point modulo 256.
     index: usize,
+    /// The distance from that point, from 0 to 1.
     inside: f64,
 }
 
@@ -64,12 +70,12 @@ impl LatticeCoordinate {
     }
 }
 
-/// The fade from one lattice point to the next.
+/// The weight of the higher lattice point at `t` between two points.
 fn fade(t: f64) -> f64 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
 }
 
-/// How fast [`fade`] changes.
+/// The derivative of [`fade`].
 fn fade_slope(t: f64) -> f64 {
     30.0 * t * t * (t - 1.0) * (t - 1.0)
 }
@@ -83,13 +89,14 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
 pub(crate) struct NoiseRow {
     pub(crate) value: Vec<f32>,
     pub(crate) gradient: [Vec<f32>; 3],
-    /// Where each sample lies in the lattice of an octave, and how far behind the lowest point of its cell.
+    /// Each sample's coordinate in the lattice of an octave.
     pub(crate) places: Vec<f64>,
+    /// Each sample's distance from the lowest point of its cell.
     inside: Vec<f32>,
 }
 
 impl NoiseRow {
-    /// Zero for `len` samples, all at the place 0.
+    /// Resets the row to `len` samples with zero noise, all at coordinate 0.
     pub(crate) fn reset(&mut self, len: usize) {
         self.places.clear();
         self.places.resize(len, 0.0);
@@ -100,32 +107,37 @@ impl NoiseRow {
     }
 }
 
-/// How noise is added to a row.
+/// The scale at which noise is added to a row.
 #[derive(Clone, Copy)]
 pub(crate) struct NoiseScale {
-    /// What values are multiplied with.
+    /// The factor of values.
     pub(crate) value: f32,
-    /// What gradients are multiplied with.
+    /// The factor of gradients.
     pub(crate) gradient: f32,
-    /// Whether 1 − 2·|noise| is added, not the noise.
+    /// Whether 1 − 2·|noise| is added instead of the noise.
     pub(crate) ridged: bool,
 }
 
 impl NoiseScale {
-    /// The noise itself.
+    /// The scale that leaves noise as it is.
     const WHOLE: Self = Self { value: 1.0, gradient: 1.0, ridged: false };
 }
 
-/// The four lattice points around a row that have the same x, seen from it: what the noise of each is multiplied with,
-/// and how that changes with y and z. y changes last.
+/// The four lattice points with the same x around a row, z fastest.
 struct Corners {
+    /// The two y of the points, modulo 256.
     index_y: [usize; 2],
+    /// The two z of the points, modulo 256.
     index_z: [usize; 2],
-    /// From the lattice point to the row.
+    /// The distance along y from each point to the row.
     y: [f64; 4],
+    /// The distance along z from each point to the row.
     z: [f64; 4],
+    /// The weight of each point's noise.
     weight: [f64; 4],
+    /// The derivative of each weight by y.
     by_y: [f64; 4],
+    /// The derivative of each weight by z.
     by_z: [f64; 4],
 }
 
@@ -149,8 +161,8 @@ impl Corners {
     }
 }
 
-/// What the lattice points of one x add to a row, as straight lines along x: the value where the row passes them, how
-/// it changes along x, and the same of the derivatives by y and z.
+/// The contribution of the lattice points of one x to a row, as straight lines along x: the value where the row passes
+/// the points and its slope along x, and the derivatives by y and z with their slopes along x.
 #[derive(Clone, Copy)]
 struct Face {
     value: f32,
@@ -167,17 +179,17 @@ impl Perlin {
         Self { table: core::array::from_fn(|index| table.hash(&[index as isize]) as u8) }
     }
 
-    /// What lattice points with this x, modulo 256, begin their hash with; y and z are added one by one.
+    /// Adds a coordinate, modulo 256, to the hash of a lattice point. Hashes start from 0, and add x, y and z in order.
     fn hash(&self, so_far: usize, next: usize) -> usize {
         usize::from(self.table[(so_far ^ next) & 255])
     }
 
-    /// Passes on the noise at each x (ascending) of a row at `z`: its index and value.
+    /// Calls `take` with the index and the noise of each x (ascending) of a row at `z`.
     #[inline]
     pub(crate) fn row_2d(&self, xs: &[f64], z: f64, mut take: impl FnMut(usize, f64)) {
         let z = LatticeCoordinate::new(z);
         let fade_z = fade(z.inside);
-        // What the two lattice points of one x add: the value where the row passes them, and how it changes.
+        // The contribution of the two lattice points of one x: the value where the row passes them, and its slope.
         let edge = |index: usize| {
             let along = self.hash(0, index);
             let corner = |index: usize, z: f64| {
@@ -196,7 +208,7 @@ impl Perlin {
         });
     }
 
-    /// Adds the noise at each of the row's places (ascending along x), at `y` and `z`, and its gradient.
+    /// Adds the noise and its gradient at each of the row's places (ascending along x), at `y` and `z`.
     pub(crate) fn add_row_3d(&self, y: f64, z: f64, share: NoiseScale, row: &mut NoiseRow) {
         let corners = Corners::new(y, z);
         let NoiseRow { value, gradient: [by_x, by_y, by_z], places, inside } = row;
@@ -227,7 +239,7 @@ impl Perlin {
         f64::from(value[0])
     }
 
-    /// What the lattice points of one x, modulo 256, add.
+    /// The contribution of the lattice points of one x, modulo 256.
     #[inline]
     fn face(&self, index: usize, corners: &Corners) -> Face {
         let along = self.hash(0, index);
@@ -249,7 +261,8 @@ impl Perlin {
     }
 }
 
-/// Adds the noise of a run in the cell between two faces, `inside` behind the lower one.
+/// Adds the noise of a run of samples in the cell between two faces. `inside`: the samples' distances from the lower
+/// face.
 #[inline]
 fn add<const RIDGED: bool>(
     inside: &[f32],
@@ -261,7 +274,7 @@ fn add<const RIDGED: bool>(
 ) {
     let len = inside.len();
     let (values, by_x, by_y, by_z) = (&mut values[..len], &mut by_x[..len], &mut by_y[..len], &mut by_z[..len]);
-    // Written out: a loop of closures is not turned into vector instructions.
+    // Written out, because the compiler does not vectorise a loop of closures.
     for index in 0..len {
         let t = inside[index];
         let back = t - 1.0;
@@ -293,9 +306,9 @@ fn for_each_cell<T: Copy>(
     mut take: impl FnMut(f64, core::ops::Range<usize>, &T, &T),
 ) {
     let mut start = 0;
-    // Coordinates are mostly evenly spaced: where a cell ends is guessed from that.
+    // Coordinates are mostly evenly spaced, which gives a guess of where a cell ends.
     let per_unit = if let [first, second, ..] = xs { 1.0 / (second - first) } else { 0.0 };
-    // The next cell, if its lower end is the former one's upper end.
+    // The next cell, which starts where the last one ends.
     let mut next: Option<(f64, usize, T)> = None;
     while let Some(&x) = xs.get(start) {
         let (cell, index, low) = match next {
@@ -307,7 +320,7 @@ fn for_each_cell<T: Copy>(
         };
         let beyond = cell + 1.0;
         let mut end = (start + 1).saturating_add(((beyond - x) * per_unit) as usize).min(xs.len());
-        // Without a branch, for it is as often the one as the other.
+        // No branch here: it would be unpredictable.
         end -= usize::from(xs[end - 1] >= beyond && end > start + 1);
         while end > start + 1 && xs[end - 1] >= beyond {
             end -= 1;
@@ -351,7 +364,7 @@ mod tests {
             let row = row_3d(&perlin, &xs, y, z);
             for (index, x) in xs.iter().enumerate() {
                 assert!((f64::from(row.value[index]) - oracle.get([*x, y, z])).abs() < 2e-6);
-                // The same bits alone as in a row.
+                // A sample alone has the same bits as in a row.
                 let alone = row_3d(&perlin, &[*x], y, z);
                 assert_eq!(alone.value[0].to_bits(), row.value[index].to_bits());
                 for axis in 0..3 {
@@ -378,8 +391,8 @@ mod tests {
         }
     }
 
-    /// The fastest change at a place along a direction, over all gradients that the corners of a cell may have: it is a
-    /// sum over the corners, and so each may be chosen alone.
+    /// The fastest change at a place along a direction, over all gradients that the corners of a cell may have. It is a
+    /// sum over the corners, so each corner's gradient can be chosen separately.
     fn fastest<const N: usize>(place: [f64; N], along: [f64; N], gradients: &[[f64; N]]) -> f64 {
         let corners = 0..1usize << N;
         corners
@@ -399,7 +412,7 @@ mod tests {
             .sum()
     }
 
-    /// Directions to all sides of the surface of a cube, and places all over a cell.
+    /// Tries directions over a face of a cube, and places all over a cell.
     #[test]
     fn the_noise_changes_no_faster_than_the_constants_say() {
         let flat = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];

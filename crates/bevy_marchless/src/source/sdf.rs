@@ -1,4 +1,4 @@
-//! Shapes given by signed distance functions, and their unions, differences and intersections.
+//! [`Sdf`]: shapes with signed distance functions, and their unions, intersections and differences.
 
 use bevy_math::DVec3;
 use bevy_reflect::Reflect;
@@ -6,13 +6,13 @@ use marchless::{Bound, Source, SourceRegion};
 
 use super::{BOUND_MARGIN, SourceError, check, check_length, check_position, rows, world_box};
 
-/// A solid made of simple ones. Lengths and positions are in world units in the terrain's space.
+/// A solid composed of simple shapes. Lengths and positions are in world units in the terrain's space.
 ///
-/// Distances are exact for single shapes. Combined ones are exact outside of a union and a lower bound of the distance
-/// elsewhere, so they never change faster than the position does, and chunks away from the surface are skipped
-/// without sampling. Each shape has a material; it is 0 until [`with_material`](Self::with_material).
+/// The distance of a single shape is exact. That of combined shapes is exact outside a union, and a lower bound
+/// elsewhere. So distances never change faster than the position, and chunks away from the surface are skipped without
+/// sampling. Each shape has a material, which is 0 until [`with_material`](Self::with_material) sets it.
 ///
-/// A shape with a length that is not a number is air; [`validate`](Self::validate) finds it.
+/// A shape with a NaN length is air; [`validate`](Self::validate) reports it.
 ///
 /// ```
 /// use bevy_marchless::source::Sdf;
@@ -32,9 +32,9 @@ pub enum Sdf {
     Sphere {
         /// Its middle.
         center: DVec3,
-        /// How far it reaches. Limit: > 0.
+        /// Its radius. Limit: > 0.
         radius: f64,
-        /// What it is made of.
+        /// Its material.
         #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
@@ -42,21 +42,21 @@ pub enum Sdf {
     Box {
         /// Its middle.
         center: DVec3,
-        /// From the middle to its faces. Limit: > 0.
+        /// The distances from the middle to its faces. Limit: > 0.
         half_size: DVec3,
-        /// What it is made of.
+        /// Its material.
         #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
-    /// All points near a line: a rod with round ends.
+    /// A rod with round ends: all points near a line segment.
     Capsule {
         /// One end of the line.
         a: DVec3,
         /// The other end.
         b: DVec3,
-        /// How far from the line it reaches. Limit: > 0.
+        /// The distance from the line to the surface. Limit: > 0.
         radius: f64,
-        /// What it is made of.
+        /// Its material.
         #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
@@ -64,11 +64,11 @@ pub enum Sdf {
     Torus {
         /// The middle of the hole.
         center: DVec3,
-        /// From the middle to the middle of the tube. Limit: > 0.
+        /// The distance from the middle of the hole to the middle of the tube. Limit: > 0.
         major: f64,
         /// The tube's radius. Limit: > 0.
         minor: f64,
-        /// What it is made of.
+        /// Its material.
         #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
@@ -76,24 +76,24 @@ pub enum Sdf {
     HalfSpace {
         /// A point on the plane.
         point: DVec3,
-        /// Away from the solid side. Limit: length 1.
+        /// The plane's normal, pointing away from the solid side. Limit: length 1.
         normal: DVec3,
-        /// What it is made of.
+        /// Its material.
         #[cfg_attr(feature = "serde", serde(default))]
         material: u8,
     },
-    /// Whatever lies in any part; where parts overlap, the material of the one that reaches out farthest.
+    /// All points in any part. Where parts overlap, the part that reaches out farthest gives the material.
     Union(Vec<Sdf>),
-    /// As a union, but with the seams between the parts filled.
+    /// A union with filled seams between its parts.
     SmoothUnion {
-        /// What is joined.
+        /// The parts.
         parts: Vec<Sdf>,
-        /// How far from a seam the filling reaches. Limit: > 0.
+        /// The distance from a seam to the edge of the filling. Limit: > 0.
         radius: f64,
     },
-    /// Whatever lies in all parts, of the first one's material. An intersection of nothing is air.
+    /// The points that lie in all parts, with the first part's material. An intersection without parts is air.
     Intersection(Vec<Sdf>),
-    /// Whatever lies in the first part and in none of the others, of the first one's material.
+    /// The points of the first part that lie in no other part, with the first part's material.
     Subtraction(Vec<Sdf>),
 }
 
@@ -118,14 +118,15 @@ impl Sdf {
         Self::Torus { center: center.into(), major, minor, material: 0 }
     }
 
-    /// Everything behind the plane through `point` whose `normal`, of any length but zero, points away from the solid.
+    /// Everything behind the plane through `point`. Its `normal` points away from the solid, and has any length but
+    /// zero.
     pub fn half_space(point: impl Into<DVec3>, normal: impl Into<DVec3>) -> Self {
-        // Of length 1, or not a number, which `validate` finds.
+        // The quotient has length 1 or is NaN, which `validate` reports.
         let normal: DVec3 = normal.into();
         Self::HalfSpace { point: point.into(), normal: normal / normal.length(), material: 0 }
     }
 
-    /// Both solids.
+    /// The union of both solids.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         match self {
@@ -134,7 +135,7 @@ impl Sdf {
         }
     }
 
-    /// Both solids, the seam between them filled up to `radius` away from it.
+    /// The union of both solids, with the seam between them filled up to `radius` away from it.
     #[must_use]
     pub fn smooth_union(self, other: Self, radius: f64) -> Self {
         match self {
@@ -145,7 +146,7 @@ impl Sdf {
         }
     }
 
-    /// What lies in both solids.
+    /// The intersection of both solids, with this one's material.
     #[must_use]
     pub fn intersection(self, other: Self) -> Self {
         match self {
@@ -163,7 +164,7 @@ impl Sdf {
         }
     }
 
-    /// The same solid, moved.
+    /// This solid, moved by `by`.
     #[must_use]
     pub fn translated(mut self, by: impl Into<DVec3>) -> Self {
         let by = by.into();
@@ -179,7 +180,7 @@ impl Sdf {
         self
     }
 
-    /// The same solid, all of one material.
+    /// This solid, all of material `new`.
     #[must_use]
     pub fn with_material(mut self, new: u8) -> Self {
         self.for_each_shape(&mut |shape| {
@@ -195,7 +196,7 @@ impl Sdf {
         self
     }
 
-    /// The solid itself, where all of its numbers make sense.
+    /// Checks all numbers of the solid, and returns it.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for a length that is not positive, a position that is not finite or a normal of length
@@ -213,7 +214,7 @@ impl Sdf {
             Self::Sphere { center, radius, material } => (position.distance(*center) - radius, *material),
             Self::Box { center, half_size, material } => {
                 let beyond = (position - center).abs() - half_size;
-                // `max` ignores what is not a number, so that is carried along by hand.
+                // `max` ignores NaN, so this sum carries NaN along.
                 let unknown = 0.0 * (beyond.x + beyond.y + beyond.z);
                 (beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0) + unknown, *material)
             }
@@ -242,7 +243,7 @@ impl Sdf {
         if distance.is_nan() { AIR } else { (distance, material) }
     }
 
-    /// Without the parts that cannot matter within `reach` of `center`: samples there stay the same, bit for bit.
+    /// This solid without the parts that cannot matter within `reach` of `center`. Samples there keep the same bits.
     pub(super) fn pruned(&self, center: DVec3, reach: f64) -> Self {
         // Two distances that differ by more than this at the centre keep their order all around.
         let apart = 2.0 * reach + (reach + center.length()) * 1e-9;
@@ -260,7 +261,8 @@ impl Sdf {
         match self {
             Self::Union(parts) => Self::Union(keep_near(parts, 0.0)),
             Self::SmoothUnion { parts, radius } => {
-                // A part fills a seam with what is at most the radius away, after each part has added a fourth of it.
+                // A part fills seams with parts up to the radius away, and each part may lower distances by a fourth
+                // of the radius first.
                 let filling = radius * (1.0 + parts.len() as f64 / 4.0);
                 Self::SmoothUnion { parts: keep_near(parts, filling), radius: *radius }
             }
@@ -270,7 +272,7 @@ impl Sdf {
         }
     }
 
-    /// The one material of all shapes that can give theirs; none where there are several.
+    /// The one material that all points of the solid have; `None` if there may be several.
     fn only_material(&self) -> Option<u8> {
         match self {
             Self::Sphere { material, .. }
@@ -287,7 +289,7 @@ impl Sdf {
         }
     }
 
-    /// The one material that solid points within `reach` of `center` can have; none where there are several.
+    /// The one material that solid points within `reach` of `center` can have; `None` if there may be several.
     #[cfg(feature = "noise")]
     pub(super) fn only_material_around(&self, center: DVec3, reach: f64) -> Option<u8> {
         self.pruned(center, reach).only_material()
@@ -350,7 +352,7 @@ impl Sdf {
     }
 }
 
-/// What there is where there is no shape.
+/// The sample where there is no shape.
 const AIR: (f64, u8) = (f64::INFINITY, 0);
 
 fn with(mut parts: Vec<Sdf>, other: Sdf) -> Vec<Sdf> {
@@ -362,7 +364,7 @@ fn nearer(a: (f64, u8), b: (f64, u8)) -> (f64, u8) {
     if b.0 < a.0 { b } else { a }
 }
 
-/// The first of the parts, cut off by the others times `sign`.
+/// The first part, cut by each other part's distance times `sign`: 1 for an intersection, −1 for a subtraction.
 fn cut(parts: &[Sdf], position: DVec3, sign: f64) -> (f64, u8) {
     let Some((first, others)) = parts.split_first() else { return AIR };
     let (distance, material) = first.sample(position);
@@ -403,7 +405,7 @@ impl Source for Sdf {
     }
 
     fn bound_closely(&self, region: &SourceRegion) -> Bound {
-        // With room around it already.
+        // This bound already includes the margin of distance.
         self.bound(region)
     }
 }

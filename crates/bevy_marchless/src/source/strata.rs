@@ -1,10 +1,11 @@
-//! Strata: which material the ground has, by depth, height and slope.
+//! [`Stratum`]: rules for the ground's materials, by depth, height and slope.
 
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
 
-/// One rule of a list that gives the ground its materials: all conditions must hold, the first rule that holds wins,
-/// and where none does the material is 0.
+/// One rule of a list that gives the ground its materials.
+///
+/// A rule holds if all of its conditions hold. The first rule that holds gives the material; if none holds, it is 0.
 ///
 /// ```
 /// use bevy_marchless::source::Stratum;
@@ -23,13 +24,13 @@ use bevy_reflect::std_traits::ReflectDefault;
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Stratum {
-    /// What the ground is made of here.
+    /// The material of the ground where the rule holds. Default: 0.
     pub material: u8,
-    /// Holds at this depth below the surface and deeper. Units: world. Default: 0, everywhere.
+    /// The smallest depth below the surface. Units: world. Default: 0, everywhere.
     pub below_depth: f64,
-    /// Holds at this height and above. Units: world, from the terrain's lowest corner. Default: −∞, everywhere.
+    /// The lowest height. Units: world, from the terrain's lowest corner. Default: −∞, everywhere.
     pub above_height: f64,
-    /// Holds where the surface above is this steep or steeper. Units: rise per run, 1 is 45°; ∞ in a ceiling.
+    /// The smallest slope of the surface above. Units: rise per run; 1 is 45°, and a ceiling has ∞.
     /// Default: 0, everywhere.
     pub steeper_than: f64,
 }
@@ -53,7 +54,7 @@ pub(crate) fn material_at(strata: &[Stratum], depth: f64, height: f64, slope: f6
 }
 
 #[cfg(any(feature = "png", test))]
-/// The one material of all ground between two depths and two heights, under whatever slope; none where it may differ.
+/// The one material of all ground between two depths and two heights, under any slope; `None` if it may differ.
 pub(crate) fn material_within(strata: &[Stratum], depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
     let mut possible = None;
     for stratum in strata.iter().filter(|stratum| stratum.holds(depth[1], height[1], f64::INFINITY)) {

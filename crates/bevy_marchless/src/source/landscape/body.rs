@@ -165,15 +165,15 @@ impl Body {
                 let Some((first, others)) = parts.split_first() else { return AIR };
                 others.iter().fold(first.known(region, noisily, calls), |so_far, other| {
                     // Where the solid is far already, nobody asks whether it is cut.
-                    let room = region.room();
-                    if so_far.distance.low >= room {
+                    let margin = region.cut_margin();
+                    if so_far.distance.low >= margin {
                         return so_far;
                     }
                     let signed = |d: Interval| if *sign < 0.0 { d.negated() } else { d };
                     let cut = other.known(region, noisily, calls).map(|d| deep(signed(d), region.reach));
                     let mut distance = so_far.distance.max(cut.distance);
-                    if so_far.distance.high >= room {
-                        distance.low = distance.low.min(room);
+                    if so_far.distance.high >= margin {
+                        distance.low = distance.low.min(margin);
                     }
                     KnownDistance {
                         distance,
@@ -216,7 +216,7 @@ fn deep(distance: Interval, reach: f64) -> Interval {
 
 impl QueryBox<'_> {
     /// What is farther outside is not cut any more. Units: world.
-    pub(super) fn room(&self) -> f64 {
+    pub(super) fn cut_margin(&self) -> f64 {
         crate::source::BOUND_MARGIN * self.spacing
     }
 

@@ -30,8 +30,8 @@ pub(super) struct Line<'a> {
     pub(super) xs: &'a [f64],
     pub(super) y: f64,
     pub(super) z: f64,
-    /// As of [`QueryBox::room`].
-    pub(super) room: f32,
+    /// As of [`QueryBox::cut_margin`].
+    pub(super) cut_margin: f32,
     /// As of [`QueryBox::reach`].
     pub(super) reach: f32,
 }
@@ -134,7 +134,7 @@ impl<'a> PreparedBody<'a> {
                 };
                 first.evaluate(line, range.clone(), out, calls);
                 for other in others {
-                    let near = |index: &usize| out.distance[*index] < line.room;
+                    let near = |index: &usize| out.distance[*index] < line.cut_margin;
                     let Some(start) = range.clone().find(near) else { return };
                     let end = range.clone().rev().find(near).map_or(start, |last| last + 1);
                     other.evaluate(line, start..end, row, calls);
@@ -143,7 +143,7 @@ impl<'a> PreparedBody<'a> {
                     let (distances, ups) = (&mut out.distance[start..end][..len], &mut out.up[start..end][..len]);
                     for index in 0..len {
                         let (before, cut) = (distances[index], *sign * cuts[index]);
-                        let is_cut = (before < line.room) & (cut > before) & (cut > -line.reach);
+                        let is_cut = (before < line.cut_margin) & (cut > before) & (cut > -line.reach);
                         distances[index] = if is_cut { cut } else { before };
                         ups[index] = if is_cut { *sign * cut_ups[index] } else { ups[index] };
                     }
