@@ -29,18 +29,18 @@ use super::interval::Interval;
 use super::noise::default_strata;
 use super::{BOUND_MARGIN, SourceError, rows, world_box};
 
-/// How deep layers and solids may be nested.
+/// The greatest depth to which layers and solids may be nested.
 const MOST_NESTED: u32 = 32;
 
-/// What a [`Landscape`] is made of: plain data, to be kept in files and changed in editors.
+/// The settings of a [`Landscape`]: plain data, which files can store and editors can change.
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct LandscapeSettings {
-    /// What is ground. Default: hills, those of [`NoiseHeights`](super::NoiseHeights).
+    /// The ground. Default: the hills of [`NoiseHeights`](super::NoiseHeights).
     pub solid: Solid,
-    /// What the ground is made of; shapes have materials of their own. [Default: material 2 from 3.5 units of depth and
-    /// where it is steeper than 1, material 1 from 1.5 units of depth, and 0 on top]
+    /// The rules for the ground's materials; shapes have materials of their own. Default: material 2 from 3.5 units of
+    /// depth and where the ground is at least as steep as 1, material 1 from 1.5 units of depth, and 0 on top.
     pub materials: Vec<MaterialRule>,
 }
 
@@ -52,17 +52,19 @@ impl Default for LandscapeSettings {
 }
 
 impl LandscapeSettings {
-    /// Says what is wrong with the settings, if anything is.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// [`SourceError`] for the first number that is out of its range, and for what is nested more than 32 deep.
+    /// [`SourceError`] for the first number that is out of its range, and for parts nested more than 32 deep.
     pub fn validate(&self) -> Result<(), SourceError> {
         self.solid.validate()?;
         self.materials.iter().try_for_each(MaterialRule::validate)
     }
 }
 
-/// [`LandscapeSettings`], ready to be sampled. Clones share the heights that were evaluated already.
+/// A source composed of layers of noise, caves, tunnels, shapes and rules for materials.
+///
+/// Clones share the heights that were evaluated already.
 #[derive(Clone, Reflect)]
 #[reflect(opaque)]
 pub struct Landscape {
@@ -77,7 +79,7 @@ struct Compiled {
 }
 
 impl Landscape {
-    /// The landscape of these settings.
+    /// A landscape with these settings.
     ///
     /// # Errors
     /// As [`LandscapeSettings::validate`].
@@ -86,25 +88,25 @@ impl Landscape {
         Ok(Self::of_valid(settings))
     }
 
-    /// The landscape of settings that are known to be valid.
+    /// A landscape with settings that are known to be valid.
     pub(super) fn of_valid(settings: LandscapeSettings) -> Self {
         let body = Body::new(&settings.solid, &mut 0);
         let rules = Rules::new(&settings.materials);
         Self { compiled: Arc::new(Compiled { settings, body, rules, noise_calls: AtomicU64::new(0) }) }
     }
 
-    /// What it is made of.
+    /// The settings of the landscape.
     pub fn settings(&self) -> &LandscapeSettings {
         &self.compiled.settings
     }
 
-    /// How often noise was evaluated so far, by this landscape and its clones: once for each octave and point.
+    /// The number of noise evaluations so far, by this landscape and its clones: one per octave and point.
     #[doc(hidden)]
     pub fn noise_calls(&self) -> u64 {
         self.compiled.noise_calls.load(Ordering::Relaxed)
     }
 
-    /// The height of the first ground in the landscape at a position; none where it has no ground. Units: world.
+    /// The height of the landscape's first ground at a position; `None` for a landscape without ground. Units: world.
     pub fn height(&self, x: f64, z: f64) -> Option<f64> {
         let mut calls = 0;
         let grounds = self.compiled.body.grounds();
@@ -119,7 +121,7 @@ impl Landscape {
         self.compiled.noise_calls.fetch_add(calls, Ordering::Relaxed);
     }
 
-    /// A region in world units; `reach` is how far distances are told apart.
+    /// Converts a region to world units, for evaluation and bounds.
     fn region<'a>(&self, region: &SourceRegion, columns: Option<ColumnWindow<'a>>) -> QueryBox<'a> {
         let sides = world_box(region).map(|[low, high]| Interval { low, high });
         let reach = self.compiled.rules.deepest.max(BOUND_MARGIN * region.spacing);
@@ -133,12 +135,12 @@ impl Landscape {
         }
     }
 
-    /// The columns of each ground in a region.
+    /// The columns of each ground in a region, by the ground's number.
     fn columns(&self, region: &SourceRegion, calls: &mut u64) -> Vec<Vec<Column>> {
         self.compiled.body.grounds().into_iter().map(|ground| ground.columns.of(region, calls)).collect()
     }
 
-    /// What is certain in a region.
+    /// The bound of a region. `noisily`: whether to evaluate noise for it.
     fn certain(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> Bound {
         let known = self.compiled.body.known(region, noisily, calls);
         if known.with_margin.low >= 0.0 && known.distance.low >= 0.0 {
@@ -225,8 +227,8 @@ impl Source for Landscape {
     }
 }
 
-/// Samples as many voxels from the surface may be left out: isovalues reach that far.
+/// The margin of close bounds: isovalues may differ from 0 by this much. [Units: voxels]
 const CLOSE: f64 = 3.0;
 
-/// Regions that are wider are not looked at column by column.
+/// The widest region that is bounded column by column. [Units: columns along an axis]
 const MOST_COLUMNS: u32 = 512;

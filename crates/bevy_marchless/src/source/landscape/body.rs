@@ -1,4 +1,4 @@
-//! [`Body`]: a [`Solid`] ready to be evaluated, and its bounds.
+//! [`Body`]: a [`Solid`] prepared for evaluation, and its bounds.
 
 use core::ops::Range;
 
@@ -12,14 +12,14 @@ use crate::source::interval::Interval;
 use crate::source::octaves::Octaves;
 use crate::source::{Fractal, Sdf};
 
-/// A [`Solid`] ready to be evaluated.
+/// A [`Solid`] prepared for evaluation.
 pub(super) enum Body {
     Everything,
     Ground(Box<Ground>),
     Noise(Box<Noise>),
     Shape(Sdf),
     Union(Vec<Body>),
-    /// The first part, cut by each other one times the sign: 1 for an intersection, −1 for a subtraction.
+    /// The first part, cut by each other part's distance times `sign`: 1 for an intersection, −1 for a subtraction.
     Cut {
         parts: Vec<Body>,
         sign: f64,
@@ -29,72 +29,73 @@ pub(super) enum Body {
 /// Everything below a field.
 pub(super) struct Ground {
     pub(super) columns: Columns,
-    /// Between which heights it lies everywhere.
+    /// The interval of all its heights.
     pub(super) range: Interval,
-    /// No column is steeper. Units: rise per run.
+    /// The steepest slope of any column. Units: rise per run.
     pub(super) steepest: f64,
-    /// Which one it is, counted through the whole landscape.
+    /// Its index among all grounds of the landscape.
     pub(super) number: usize,
 }
 
-/// Something made of 3-D noise.
+/// A solid made of 3-D noise.
 pub(super) struct Noise {
     pub(super) kind: NoiseKind,
-    /// Every how many samples the noise is evaluated.
+    /// The spacing of noise evaluations, in samples.
     pub(super) lattice: u32,
-    /// Gradients are taken for at least this steep, so that distances stay small where the noise is flat.
+    /// The least gradient that distances are computed with, so that they stay small where the noise is flat.
     pub(super) flattest: f64,
-    /// No gradient is steeper.
+    /// The steepest gradient of the noise.
     pub(super) steepest: f64,
 }
 
 pub(super) enum NoiseKind {
-    /// Where it is above the threshold.
+    /// Points where the noise is above the threshold.
     Caves { noise: Octaves, threshold: f64 },
-    /// Where the length of both is below the width.
+    /// Points where the length of the vector of both noises is below the width.
     Tunnels { noises: Box<[Octaves; 2]>, width: f64 },
 }
 
-/// The second noise of tunnels has seeds this far from the first one's.
+/// The difference between the seeds of both noises of tunnels.
 const OTHER_SEED: u32 = 0x51ED;
 
-/// A material given by the landscape's rules; others are those of a shape.
+/// The mark of points whose material comes from the landscape's rules; lower values are a shape's material.
 pub(super) const BY_RULES: u16 = 256;
 
-/// A box that is asked about.
+/// A box of samples to evaluate or to bound.
 pub(super) struct QueryBox<'a> {
     /// Its lowest and highest coordinates. Units: world.
     pub(super) sides: [Interval; 3],
     /// World units between samples.
     pub(super) spacing: f64,
-    /// Distances beyond this are all alike. Units: world.
+    /// The distance from the surface beyond which exact distances do not matter. Units: world.
     pub(super) reach: f64,
-    /// How far from the surface samples must be to be left out. Units: world.
+    /// The distance that samples must have from the surface for a bound to be certain. Units: world.
     pub(super) margin: f64,
-    /// Whether grounds keep the margin by the measure of their samples, and not only along y.
+    /// Whether grounds keep the margin in the distances of their samples, instead of only along y.
     pub(super) strictly: bool,
-    /// The columns of each ground, by its number, where they are to be looked at: all of them, and which part of them
-    /// lies in the box, along x and z.
+    /// The columns of the grounds, if bounds are to use them.
     pub(super) columns: Option<ColumnWindow<'a>>,
 }
 
-/// A part of the columns of all grounds.
+/// A window into the columns of all grounds.
 #[derive(Clone)]
 pub(super) struct ColumnWindow<'a> {
+    /// All columns of each ground, by the ground's number; x fastest.
     pub(super) columns: &'a [Vec<Column>],
-    /// Columns along x.
+    /// The number of columns along x.
     pub(super) width: usize,
+    /// The columns that lie in the box, along x and z.
     pub(super) part: [Range<usize>; 2],
 }
 
-/// What is known of a solid in a box.
+/// The bounds of a solid in a box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KnownDistance {
-    /// Between which values all distances lie. Units: world.
+    /// The interval of all distances. Units: world.
     pub(super) distance: Interval,
-    /// The same with the margin to both sides.
+    /// The interval of all distances, widened by the margin on both sides. Units: world.
     pub(super) with_margin: Interval,
-    /// What solid samples are made of, where that is certain.
+    /// The one material of solid samples, or [`BY_RULES`]; `None` if it is not certain.
     pub(super) matter: Option<u16>,
 }
 
@@ -104,14 +105,14 @@ impl KnownDistance {
         Self { distance, with_margin, matter }
     }
 
-    /// The distances sent through a function of intervals.
+    /// Applies a function to both intervals.
     fn map(self, through: impl Fn(Interval) -> Interval) -> Self {
         Self { distance: through(self.distance), with_margin: through(self.with_margin), ..self }
     }
 }
 
 impl Body {
-    /// Of a solid that is valid. `grounds`: how many there are so far.
+    /// Prepares a valid solid. `grounds`: the number of grounds so far.
     pub(super) fn new(solid: &Solid, grounds: &mut usize) -> Self {
         let mut all = |parts: &[Solid]| parts.iter().map(|part| Self::new(part, grounds)).collect::<Vec<_>>();
         match solid {
@@ -142,7 +143,7 @@ impl Body {
         }
     }
 
-    /// What is known of it in a box. `noisily`: whether to evaluate noise for it, once for each noise.
+    /// The bounds of the solid in a box. `noisily`: whether to evaluate noise for them, once for each noise.
     pub(super) fn known(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> KnownDistance {
         match self {
             Self::Everything => KnownDistance::new(Interval::exactly(f64::NEG_INFINITY), region, Some(BY_RULES)),
@@ -164,7 +165,7 @@ impl Body {
             Self::Cut { parts, sign } => {
                 let Some((first, others)) = parts.split_first() else { return AIR };
                 others.iter().fold(first.known(region, noisily, calls), |so_far, other| {
-                    // Where the solid is far already, nobody asks whether it is cut.
+                    // A solid that is far from the box already need not be cut.
                     let margin = region.cut_margin();
                     if so_far.distance.low >= margin {
                         return so_far;
@@ -186,13 +187,13 @@ impl Body {
     }
 }
 
-/// Nothing at all.
+/// The bounds of an empty solid.
 const AIR: KnownDistance = {
     let far = Interval { low: f64::INFINITY, high: f64::INFINITY };
     KnownDistance { distance: far, with_margin: far, matter: Some(BY_RULES) }
 };
 
-/// What lies in either of two solids.
+/// The bounds of the union of two solids.
 fn nearer(a: KnownDistance, b: KnownDistance) -> KnownDistance {
     let matter = if b.distance.low >= 0.0 || a.distance.high < b.distance.low || a.matter == b.matter {
         a.matter
@@ -204,18 +205,18 @@ fn nearer(a: KnownDistance, b: KnownDistance) -> KnownDistance {
     KnownDistance { distance: a.distance.min(b.distance), with_margin: a.with_margin.min(b.with_margin), matter }
 }
 
-/// Distances that are out of reach are endless.
+/// Replaces distances outside the solid that are out of reach by infinity.
 fn far(distance: Interval, reach: f64) -> Interval {
     distance.through(|d| if d >= reach { f64::INFINITY } else { d })
 }
 
-/// Depths that are out of reach are endless.
+/// Replaces distances inside the solid that are out of reach by minus infinity.
 fn deep(distance: Interval, reach: f64) -> Interval {
     distance.through(|d| if d <= -reach { f64::NEG_INFINITY } else { d })
 }
 
 impl QueryBox<'_> {
-    /// What is farther outside is not cut any more. Units: world.
+    /// The distance outside a solid from which on it is not cut. Units: world.
     pub(super) fn cut_margin(&self) -> f64 {
         crate::source::BOUND_MARGIN * self.spacing
     }
@@ -235,11 +236,11 @@ impl Ground {
                 if noisily { self.columns.field().within(x, z, calls).within(self.range) } else { self.range };
             let above = y.plus(heights.negated());
             let flat = 1.0 / (1.0 + self.steepest * self.steepest).sqrt();
-            // A slope makes distances smaller, and keeps their sign.
+            // On a slope, distances are smaller than heights above it; their sign is the same.
             let low = if above.low > 0.0 { above.low * flat } else { above.low };
             let high = if above.high < 0.0 { above.high * flat } else { above.high };
             let known = KnownDistance::new(Interval { low, high }, region, Some(BY_RULES));
-            // From far away, heights tell more than the steepest slope that there may be.
+            // Far from the ground, heights give better bounds than the steepest possible slope.
             let with_margin = Interval { low: above.low - region.margin, high: above.high + region.margin };
             return if region.strictly { known } else { KnownDistance { with_margin, ..known } };
         };
@@ -272,10 +273,10 @@ impl Noise {
         Self { kind, lattice: tunnels.lattice, flattest: typical / 4.0, steepest }
     }
 
-    /// Between which values distances lie.
+    /// The interval of all distances in a box.
     fn distance(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> Interval {
         let (center, radius) = region.ball();
-        // Interpolated noise is made of noise as far away as the lattice is wide.
+        // Interpolated noise depends on noise up to a cell of the lattice away.
         let more = if self.lattice > 1 { f64::from(self.lattice) * region.spacing * 3.0_f64.sqrt() } else { 0.0 };
         let mut around = |octaves: &Octaves| {
             if !noisily {

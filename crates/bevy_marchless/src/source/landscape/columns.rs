@@ -9,31 +9,34 @@ use marchless::SourceRegion;
 use super::field::{Field, FieldPoints};
 use crate::source::height_field::Column;
 
-/// Columns along a side of a tile.
+/// The number of columns along a side of a tile.
 const TILE: i64 = 16;
 
-/// So many parts of the cache are locked apart from each other.
+/// The number of parts of the cache that are locked separately.
 const SHARDS: usize = 8;
 
-/// A shard holds at most twice as many tiles: the cache of one ground stays below 8 · 2 · 512 · 2 KB = 16 MB, which
-/// is a square of 90 tiles or 1,448 columns.
+/// The most tiles in one generation of a shard.
+///
+/// A shard holds two generations. So the cache of one ground stays below 8 · 2 · 512 · 2 KB = 16 MB, which is a square
+/// of 90 tiles or 1,448 columns.
 const TILES_PER_GENERATION: usize = 512;
 
-/// The heights of [`TILE`]² columns, x fastest; evaluated by whoever asks first, while others wait.
+/// The heights of [`TILE`]² columns, x fastest. The thread that needs a tile first evaluates it; others wait for it.
 type Tile = Arc<OnceLock<Box<[f64]>>>;
 
-/// Where a tile lies, in tiles, and the spacing of its columns.
+/// A tile's position along x and z, in tiles, and the bits of the spacing of its columns.
 type Key = (i64, i64, u64);
 
 /// The heights of one ground.
 ///
-/// Tiles lie at multiples of 16 columns, whatever the chunks are: so a height is evaluated once, for all regions.
+/// Tiles lie at multiples of 16 columns, whatever the size of chunks. So each height is evaluated once for all regions.
 pub(super) struct Columns {
     field: Field,
     shards: [Mutex<Shard>; SHARDS],
 }
 
-/// Two generations of tiles: those of the older one that nobody asks for are dropped when the younger one is full.
+/// Two generations of tiles. When the younger one is full, it becomes the older one; tiles of the former older one that
+/// have not been used since are dropped.
 #[derive(Default)]
 struct Shard {
     young: HashMap<Key, Tile>,
@@ -63,8 +66,8 @@ impl Columns {
         &self.field
     }
 
-    /// The ground of each column of a region, x fastest. Slopes are central differences, and so depend on nothing but
-    /// the column's position and the spacing.
+    /// The ground in each column of a region, x fastest. Slopes are central differences, so they depend only on the
+    /// column's position and the spacing.
     pub(super) fn of(&self, region: &SourceRegion, calls: &mut u64) -> Vec<Column> {
         let [nx, nz] = [0, 2].map(|axis| region.size[axis] as usize);
         let width = nx + 2;
@@ -105,7 +108,7 @@ impl Columns {
 
     fn tile(&self, key: Key) -> Tile {
         let shard = (key.0.wrapping_mul(5).wrapping_add(key.1.wrapping_mul(3))).rem_euclid(SHARDS as i64) as usize;
-        // A shard is whole at all times, so a panic elsewhere while it was locked left nothing undone.
+        // A poisoned lock is harmless: a shard is consistent at all times, even if a thread panicked while it held it.
         self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner).tile(key)
     }
 

@@ -1,4 +1,4 @@
-//! [`Field`]: a [`Layer`] ready to be evaluated, and bounded.
+//! [`Field`]: a [`Layer`] prepared for evaluation, and its bounds.
 
 use bevy_math::DVec2;
 
@@ -7,7 +7,7 @@ use crate::source::Fractal;
 use crate::source::interval::Interval;
 use crate::source::octaves::Octaves;
 
-/// A [`Layer`] ready to be evaluated. Functions add to `calls` how often they evaluated noise.
+/// A [`Layer`] prepared for evaluation. Functions add the number of noise evaluations to `calls`.
 #[derive(Clone)]
 pub(super) enum Field {
     Constant(f64),
@@ -22,19 +22,19 @@ pub(super) enum Field {
     Curve { of: Box<Field>, points: Vec<DVec2> },
 }
 
-/// Where a field is evaluated.
+/// The points at which a field is evaluated.
 pub(super) enum FieldPoints<'a> {
-    /// At all pairs of an x and a z; x changes fastest.
+    /// All pairs of an x and a z; x changes fastest.
     Grid { xs: &'a [f64], zs: &'a [f64] },
-    /// At each x with its z.
+    /// Each x with its z.
     Scattered { xs: &'a [f64], zs: &'a [f64] },
 }
 
-/// The seeds of a warp along z are this far from those along x: more than one fractal has octaves.
+/// The difference between the seeds of a warp along x and z; more than a fractal has octaves.
 const OTHER_SEED: u32 = 0x9E37;
 
 impl Field {
-    /// Of a layer that is valid.
+    /// Prepares a valid layer.
     pub(super) fn new(layer: &Layer) -> Self {
         let all = |layers: &[Layer]| layers.iter().map(Self::new).collect::<Vec<_>>();
         let sum = |layers: &[Layer]| match layers {
@@ -61,7 +61,7 @@ impl Field {
         }
     }
 
-    /// The values at `places`, one for each.
+    /// Writes the values at `places`, one for each.
     pub(super) fn values(&self, places: &FieldPoints, values: &mut [f64], calls: &mut u64) {
         let fold = |fields: &[Self], join: fn(f64, f64) -> f64, none: f64, values: &mut [f64], calls: &mut u64| {
             let Some((first, others)) = fields.split_first() else { return values.fill(none) };
@@ -101,7 +101,7 @@ impl Field {
         }
     }
 
-    /// Between which values all of a rectangle lie; `x`, `z`: its sides. The noise is evaluated in the middle alone.
+    /// The interval of all values in a rectangle with the sides `x` and `z`. Evaluates noise only in its middle.
     pub(super) fn within(&self, x: Interval, z: Interval, calls: &mut u64) -> Interval {
         self.interval(&mut |octaves, [along_x, along_z]| {
             let [x, z] = [x.plus(along_x), z.plus(along_z)];
@@ -111,12 +111,13 @@ impl Field {
         })
     }
 
-    /// Between which values it lies everywhere.
+    /// The interval of all values of the field.
     pub(super) fn range(&self) -> Interval {
         self.interval(&mut |octaves, _| octaves.range())
     }
 
-    /// The field's interval from those of its noises, which are asked for with how far they are moved along x and z.
+    /// The interval of the field, from those of its noises. `noise`: gives the interval of a noise, from the intervals
+    /// by which warps move it along x and z.
     fn interval(&self, noise: &mut dyn FnMut(&Octaves, [Interval; 2]) -> Interval) -> Interval {
         let zero = Interval::exactly(0.0);
         let mut all = |fields: &[Self], join: fn(Interval, Interval) -> Interval, none: f64| {
@@ -145,7 +146,7 @@ impl Field {
         .widened(1e-12)
     }
 
-    /// How much the field changes at most per world unit; infinite where it is not known.
+    /// The greatest change of the field per world unit; infinite if it is not known.
     pub(super) fn lipschitz(&self) -> f64 {
         let most = |fields: &[Self]| fields.iter().map(Self::lipschitz).fold(0.0, f64::max);
         match self {
@@ -162,7 +163,8 @@ impl Field {
             }
             Self::Minimum(fields) | Self::Maximum(fields) => most(fields),
             Self::Clamp { of, .. } => of.lipschitz(),
-            // Between the terraces, a straight ramp of 1/(1 − sharpness), and at most 1.5 times that where it is eased.
+            // Between terraces is a ramp of slope 1/(1 − sharpness). Easing makes it up to 1 + sharpness/2 times
+            // steeper.
             Self::Terraces { of, sharpness, .. } => of.lipschitz() * (1.0 + 0.5 * sharpness) / (1.0 - sharpness),
             Self::Warp { of, along_x, along_z, reach } => {
                 let bent = along_x.lipschitz_2d().hypot(along_z.lipschitz_2d());
@@ -175,7 +177,7 @@ impl Field {
         }
     }
 
-    /// What a field that bends another makes of its value.
+    /// Applies the field's clamp, terraces or curve to a value.
     fn bend(&self, value: f64) -> f64 {
         match self {
             Self::Clamp { min, max, .. } => value.max(*min).min(*max),
@@ -199,7 +201,7 @@ fn along_curve(points: &[DVec2], x: f64) -> f64 {
     match (after.checked_sub(1).and_then(|before| points.get(before)), points.get(after)) {
         (Some(a), Some(b)) => {
             let share = (x - a.x) / (b.x - a.x);
-            // Never beyond the ends, whatever is rounded.
+            // Rounding must not take the value beyond both ends.
             let y = a.y + (b.y - a.y) * share;
             y.clamp(a.y.min(b.y), a.y.max(b.y))
         }

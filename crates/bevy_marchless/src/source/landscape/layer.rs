@@ -1,4 +1,4 @@
-//! [`Layer`]: a number for each column, composed of noise.
+//! [`Layer`]: a value for each column, composed of noise.
 
 use core::ops::{Add, Mul};
 
@@ -9,10 +9,11 @@ use bevy_reflect::std_traits::ReflectDefault;
 use super::MOST_NESTED;
 use crate::source::{FARTHEST, Fractal, SourceError, check, check_length, check_position};
 
-/// A number for each column of the world: heights, or what heights are made of.
+/// A value for each column: a height, or a part of one.
 ///
-/// Layers are plain data, and are composed: `+` and `*` join them, [`min`](Self::min) and [`max`](Self::max) choose,
-/// the others bend what they are called on. Variants with a field `of` bend the sum of the layers in it.
+/// Layers are plain data and can be composed. `+` and `*` join two layers, [`min`](Self::min) and [`max`](Self::max)
+/// choose between two, and the other methods change a single one. Variants with a field `of` change the sum of the
+/// layers in it.
 ///
 /// ```
 /// use bevy_marchless::source::{Fractal, Layer};
@@ -29,24 +30,24 @@ use crate::source::{FARTHEST, Fractal, SourceError, check, check_length, check_p
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub enum Layer {
-    /// The same everywhere.
+    /// The same value in all columns.
     Constant(f64),
     /// Fractal noise.
     Noise {
         /// The noise.
         noise: Fractal,
-        /// How far it reaches above and below 0 at most. Limit: from −1e9 to 1e9.
+        /// The greatest value above and below 0. Limit: from −1e9 to 1e9.
         amplitude: f64,
     },
-    /// All layers added up; 0 for none.
+    /// The sum of all layers; 0 without any.
     Sum(Vec<Layer>),
-    /// All layers multiplied; 1 for none.
+    /// The product of all layers; 1 without any.
     Product(Vec<Layer>),
     /// The lowest of the layers. Limit: one or more.
     Minimum(Vec<Layer>),
     /// The highest of the layers. Limit: one or more.
     Maximum(Vec<Layer>),
-    /// What lies beyond two ends is brought to them.
+    /// Values clamped between two ends.
     Clamp {
         /// The layers whose sum is changed.
         of: Vec<Layer>,
@@ -55,25 +56,25 @@ pub enum Layer {
         /// The upper end.
         max: f64,
     },
-    /// Steps: flat at each multiple of `step`, and steep between.
+    /// Terraces: flat at each multiple of `step`, and steep between.
     Terraces {
         /// The layers whose sum is changed.
         of: Vec<Layer>,
-        /// From one terrace to the next. Limit: > 0.
+        /// The height from one terrace to the next. Limit: > 0.
         step: f64,
-        /// From 0, no terraces at all, to (not quite) 1, which are cliffs. Limit: 0..=0.99.
+        /// The steepness between terraces: 0 leaves values as they are, values near 1 give cliffs. Limit: 0..=0.99.
         sharpness: f64,
     },
-    /// Another place: the layers are taken from up to `reach` away along x and along z, as two noises say.
+    /// Domain warping: two noises choose the place where the layers are evaluated, up to `reach` away along x and z.
     Warp {
         /// The layers whose sum is changed.
         of: Vec<Layer>,
-        /// Where from. The one for z has another seed.
+        /// The noise that chooses the place along x. The noise for z differs only in its seed.
         noise: Fractal,
-        /// How far away at most, along each axis. Units: world. Limit: 0..=1e9.
+        /// The greatest distance along each axis. Units: world. Limit: 0..=1e9.
         reach: f64,
     },
-    /// A curve through points (what comes in, what goes out), straight between them and level beyond its ends.
+    /// Values mapped by a curve through points (input, output), straight between them and level beyond its ends.
     Curve {
         /// The layers whose sum is changed.
         of: Vec<Layer>,
@@ -96,17 +97,17 @@ impl From<f64> for Layer {
 }
 
 impl Layer {
-    /// Fractal noise that reaches `amplitude` above and below 0 at most.
+    /// Fractal noise with values from −`amplitude` to `amplitude`.
     pub fn noise(noise: Fractal, amplitude: f64) -> Self {
         Self::Noise { noise, amplitude }
     }
 
-    /// Sharp ridges: folded fractal noise ([`Fractal::ridged`]) that reaches `amplitude` above and below 0 at most.
+    /// Sharp ridges: folded fractal noise ([`Fractal::ridged`]) with values from −`amplitude` to `amplitude`.
     pub fn ridges(noise: Fractal, amplitude: f64) -> Self {
         Self::Noise { noise: Fractal { ridged: true, ..noise }, amplitude }
     }
 
-    /// Whichever layer is lower.
+    /// The lower of both layers.
     #[must_use]
     pub fn min(self, other: impl Into<Self>) -> Self {
         match self {
@@ -115,7 +116,7 @@ impl Layer {
         }
     }
 
-    /// Whichever layer is higher.
+    /// The higher of both layers.
     #[must_use]
     pub fn max(self, other: impl Into<Self>) -> Self {
         match self {
@@ -124,40 +125,41 @@ impl Layer {
         }
     }
 
-    /// Brought to `min` where it is lower and to `max` where it is higher.
+    /// This layer, clamped between `min` and `max`.
     #[must_use]
     pub fn clamped(self, min: f64, max: f64) -> Self {
         Self::Clamp { of: self.into_terms(), min, max }
     }
 
-    /// In terraces: flat at each multiple of `step`; `sharpness` from 0 (as it was) to 0.99 (cliffs).
+    /// This layer in terraces, flat at each multiple of `step`. `sharpness`: from 0 (no change) to 0.99 (cliffs).
     #[must_use]
     pub fn terraced(self, step: f64, sharpness: f64) -> Self {
         Self::Terraces { of: self.into_terms(), step, sharpness }
     }
 
-    /// Taken from up to `reach` away along x and z, as `noise` says: bent out of shape. Units of `reach`: world.
+    /// This layer warped: evaluated up to `reach` away along x and z, at places that `noise` chooses. `reach`: in world
+    /// units.
     #[must_use]
     pub fn warped(self, noise: Fractal, reach: f64) -> Self {
         Self::Warp { of: self.into_terms(), noise, reach }
     }
 
-    /// Sent through a curve, given by points (what comes in, what goes out) of ascending x.
+    /// This layer mapped by a curve, given by points (input, output) of ascending x.
     #[must_use]
     pub fn curved(self, points: impl IntoIterator<Item = impl Into<DVec2>>) -> Self {
         Self::Curve { of: self.into_terms(), points: points.into_iter().map(Into::into).collect() }
     }
 
-    /// Says what is wrong with the layer, if anything is.
+    /// Checks the layer and all layers in it.
     ///
     /// # Errors
-    /// [`SourceError`] for the first number that is out of its range, a list that is empty where it must not be, and
-    /// layers nested more than 32 deep.
+    /// [`SourceError`] for the first number that is out of its range, for a list that must not be empty, and for layers
+    /// nested more than 32 deep.
     pub fn validate(&self) -> Result<(), SourceError> {
         self.check(MOST_NESTED)
     }
 
-    /// The layers of which this one is the sum.
+    /// The terms whose sum is this layer.
     fn into_terms(self) -> Vec<Self> {
         match self {
             Self::Sum(layers) => layers,

@@ -1,4 +1,4 @@
-//! [`MaterialRule`]: which material the ground has, by depth, height, slope and noise.
+//! [`MaterialRule`]: rules for the ground's materials, by depth, height, slope and noise.
 
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
@@ -9,8 +9,9 @@ use crate::source::octaves::Octaves;
 use crate::source::perlin::NoiseRow;
 use crate::source::{Fractal, SourceError, Stratum, check};
 
-/// One rule of a list that gives the ground its materials: the first rule that holds wins, and where none does the
-/// material is 0.
+/// One rule of a list that gives the ground its materials.
+///
+/// The first rule that holds gives the material; if none holds, it is 0.
 ///
 /// ```
 /// use bevy_marchless::source::{Fractal, MaterialRule, Stratum};
@@ -28,21 +29,23 @@ use crate::source::{Fractal, SourceError, Stratum, check};
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MaterialRule {
-    /// The material, and the depth, height and slope where it is.
+    /// The material, and its conditions of depth, height and slope.
     pub stratum: Stratum,
-    /// Where else the rule must hold. Default: none, everywhere.
+    /// The patches to which the rule is limited. Default: `None`, no limit.
     pub patches: Option<Patches>,
 }
 
-/// Where 3-D noise is above a threshold. Put rules without patches first where they can be: noise is evaluated where a
-/// rule with patches decides, and ground of unsure material is never skipped.
+/// Patches of ground: points where 3-D noise is above a threshold.
+///
+/// Put rules without patches first if possible. Noise is evaluated where a rule with patches decides, and a bound never
+/// skips ground of uncertain material.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Patches {
-    /// The noise; its `zoom` is about the distance between patches. Default: as of [`Fractal`].
+    /// The noise; its `zoom` is about the distance between patches. Default: that of [`Fractal`].
     pub noise: Fractal,
-    /// At −1 the patches cover all, at 1 nothing. Limit: −1..=1. Default: 0.
+    /// The threshold: at −1 the patches cover everything, at 1 nothing. Limit: −1..=1. Default: 0.
     pub above: f64,
 }
 
@@ -59,13 +62,13 @@ impl From<Stratum> for MaterialRule {
 }
 
 impl MaterialRule {
-    /// The same rule, only where `noise` is above `above`.
+    /// This rule, limited to points where `noise` is above `above`.
     #[must_use]
     pub fn in_patches(self, noise: Fractal, above: f64) -> Self {
         Self { patches: Some(Patches { noise, above }), ..self }
     }
 
-    /// Says what is wrong with the rule, if anything is.
+    /// Checks the rule.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -77,21 +80,21 @@ impl MaterialRule {
     }
 }
 
-/// A list of [`MaterialRule`], ready to be used.
+/// A list of [`MaterialRule`], prepared for evaluation.
 pub(super) struct Rules {
     rules: Vec<Rule>,
-    /// Nothing changes farther below the surface. Units: world.
+    /// The greatest depth at which materials change. Units: world.
     pub(super) deepest: f64,
 }
 
 struct Rule {
     stratum: Stratum,
-    /// The noise, and above which value the rule holds.
+    /// The noise and the threshold above which the rule holds.
     patches: Option<(Octaves, f64)>,
 }
 
 impl Rules {
-    /// Of rules that are valid.
+    /// Prepares valid rules.
     pub(super) fn new(rules: &[MaterialRule]) -> Self {
         let depths = rules.iter().map(|rule| rule.stratum.below_depth).filter(|depth| depth.is_finite());
         let rule = |MaterialRule { stratum, patches }: &MaterialRule| Rule {
@@ -101,7 +104,7 @@ impl Rules {
         Self { deepest: depths.fold(0.0, f64::max), rules: rules.iter().map(rule).collect() }
     }
 
-    /// The one material of all ground between two depths and two heights; none where it may differ.
+    /// The one material of all ground between two depths and two heights; `None` if it may differ.
     pub(super) fn material_within(&self, depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
         let mut possible = None;
         for Rule { stratum, patches } in &self.rules {
@@ -119,13 +122,13 @@ impl Rules {
         (possible.unwrap_or(0) == 0).then_some(0)
     }
 
-    /// The rules for rows of these coordinates along x. Units: world.
+    /// The rules for rows with these coordinates along x. Units: world.
     pub(super) fn for_rows<'a>(&'a self, xs: &'a [f64]) -> RowRules<'a> {
         RowRules { rules: &self.rules, xs, chosen: vec![AIR; xs.len()], noise: NoiseRow::default() }
     }
 }
 
-/// [`Rules`] for rows of the same x.
+/// [`Rules`] for rows with the same coordinates along x.
 pub(super) struct RowRules<'a> {
     rules: &'a [Rule],
     xs: &'a [f64],
@@ -143,7 +146,7 @@ const AIR: i32 = -2;
 impl RowRules<'_> {
     /// Gives the solid samples of a row their materials.
     pub(super) fn give(&mut self, line: &Line, row: &Row, materials: &mut [u8], calls: &mut u64) {
-        // Loops over numbers of one width, without branches: so they are turned into vector instructions.
+        // Loops over numbers of one width, without branches, so that the compiler vectorises them.
         let len = materials.len();
         let (distances, ups, matters) = (&row.distance[..len], &row.up[..len], &row.matter[..len]);
         let chosen = &mut self.chosen[..len];
@@ -158,7 +161,7 @@ impl RowRules<'_> {
             if line.y < stratum.above_height {
                 continue;
             }
-            // Slopes are told by how much of the way out of the ground leads up.
+            // The slope condition as a condition on the y part of the surface's normal.
             let steeper = stratum.steeper_than;
             let most_up = if steeper <= 0.0 { f32::INFINITY } else { (1.0 / (1.0 + steeper * steeper).sqrt()) as f32 };
             let highest = -stratum.below_depth as f32;

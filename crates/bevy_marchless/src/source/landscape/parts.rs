@@ -1,4 +1,4 @@
-//! [`PreparedBody`]: a [`Body`] made ready for one region, and evaluated row by row.
+//! [`PreparedBody`]: a [`Body`] prepared for one region, and evaluated row by row.
 
 use core::ops::Range;
 
@@ -14,15 +14,15 @@ use crate::source::perlin::NoiseRow;
 /// The samples of a row.
 #[derive(Clone)]
 pub(super) struct Row {
-    /// Units: world.
+    /// The signed distance of each sample. Units: world.
     pub(super) distance: Vec<f32>,
-    /// How much of the way out of the surface leads up: 1 on a floor, 0 at a wall, −1 under a ceiling.
+    /// The y part of the surface's normal at each sample: 1 on a floor, 0 at a wall, −1 under a ceiling.
     pub(super) up: Vec<f32>,
-    /// The material, or [`BY_RULES`].
+    /// The material of each sample, or [`BY_RULES`].
     pub(super) matter: Vec<u16>,
 }
 
-/// Which row.
+/// The position of a row, and the distances that matter for it.
 pub(super) struct Line<'a> {
     /// Local y and z.
     pub(super) index: [u32; 2],
@@ -30,13 +30,13 @@ pub(super) struct Line<'a> {
     pub(super) xs: &'a [f64],
     pub(super) y: f64,
     pub(super) z: f64,
-    /// As of [`QueryBox::cut_margin`].
+    /// The distance of [`QueryBox::cut_margin`].
     pub(super) cut_margin: f32,
-    /// As of [`QueryBox::reach`].
+    /// The distance of [`QueryBox::reach`].
     pub(super) reach: f32,
 }
 
-/// A [`Body`] made ready for one region: what cannot matter there is left out.
+/// A [`Body`] prepared for one region, without the parts that cannot matter there.
 pub(super) enum PreparedBody<'a> {
     Everything,
     Ground(&'a [Column]),
@@ -51,7 +51,7 @@ impl Row {
         Self { distance: vec![0.0; len], up: vec![0.0; len], matter: vec![BY_RULES; len] }
     }
 
-    /// The same for all samples in `range`, of the material that the rules give.
+    /// Sets all samples in `range` to one distance and slope, with the material of the rules.
     fn fill(&mut self, range: Range<usize>, distance: f32, up: f32) {
         self.distance[range.clone()].fill(distance);
         self.up[range.clone()].fill(up);
@@ -60,7 +60,7 @@ impl Row {
 }
 
 impl<'a> PreparedBody<'a> {
-    /// `columns`: those of each ground, by its number.
+    /// Prepares a body for a region. `columns`: those of each ground, by its number.
     pub(super) fn new(body: &'a Body, samples: &SourceRegion, region: &QueryBox, columns: &'a [Vec<Column>]) -> Self {
         let row = || Row::new(samples.size[0] as usize);
         match body {
@@ -88,9 +88,9 @@ impl<'a> PreparedBody<'a> {
         }
     }
 
-    /// Evaluates the samples of a row that lie in `range`. Each depends on nothing but its position.
+    /// Evaluates the samples of a row that lie in `range`. Each sample depends only on its position.
     ///
-    /// Loops over samples are written out, over slices of one length: so they are turned into vector instructions.
+    /// Loops over samples are written out, over slices of one length, so that the compiler vectorises them.
     pub(super) fn evaluate(&mut self, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
         match self {
             Self::Everything => out.fill(range, f32::NEG_INFINITY, 1.0),
@@ -110,7 +110,7 @@ impl<'a> PreparedBody<'a> {
                     let (distance, material) = shape.sample(position);
                     out.distance[index] = distance as f32;
                     out.matter[index] = u16::from(material);
-                    // As of a wall: a shape's own samples need no slope, and what it cuts has walls most of all.
+                    // As at a wall: a shape's own samples need no slope, and the parts it cuts mostly get walls.
                     out.up[index] = 0.0;
                 }
             }
@@ -153,12 +153,12 @@ impl<'a> PreparedBody<'a> {
     }
 }
 
-/// Samples of 3-D noise, at each of a region's lattice points or interpolated between every n-th.
+/// Samples of 3-D noise, evaluated at each point of a region or interpolated between every n-th point.
 pub(super) struct NoiseSamples<'a> {
     noise: &'a Noise,
     /// The noise at the samples of a row.
     rows: [NoiseRow; 2],
-    /// By how much the first noise is too far from 0 for tunnels.
+    /// The excess of the first noise over the values that tunnels allow; negative where tunnels are possible.
     too_far: Vec<f32>,
     lattice: Option<NoiseLattice>,
 }
@@ -177,7 +177,7 @@ impl<'a> NoiseSamples<'a> {
         }
     }
 
-    /// Evaluates one of the noises.
+    /// Evaluates the noise `which`, 0 or 1, for a row.
     fn noise(&mut self, which: usize, line: &Line, range: Range<usize>, calls: &mut u64) {
         let octaves = match &self.noise.kind {
             NoiseKind::Caves { noise, .. } => noise,
@@ -205,7 +205,7 @@ impl<'a> NoiseSamples<'a> {
 
     fn tunnels(&mut self, width: f32, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
         let (flattest, len) = (self.noise.flattest as f32, range.len());
-        // What is far from where the first noise is 0 is far from the tunnels, whatever the other noise is.
+        // Points far from the zeros of the first noise are far from tunnels, whatever the other noise is.
         self.too_far.clear();
         self.too_far.resize(len, 0.0);
         let NoiseRow { value, gradient: [by_x, by_y, by_z], .. } = &self.rows[0];
@@ -243,24 +243,24 @@ fn length([x, y, z]: [f32; 3]) -> f32 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// So many times their reach away, as the first of two noises tells, tunnels are not looked for.
+/// The distance from the zeros of the first noise beyond which tunnels are not looked for, as a multiple of the reach.
 const FAR: f32 = 1.5;
 
-/// Noise at every n-th lattice point, each row of it evaluated when it is first needed.
+/// Noise at nodes, which are every n-th lattice point. Each row of nodes is evaluated when it is first needed.
 struct NoiseLattice {
     /// The lowest node, in nodes.
     first: [i64; 3],
     /// Nodes per axis.
     size: [usize; 3],
-    /// For each sample along each axis, the node below it, and how much of the way to the next it lies behind it.
+    /// For each sample along each axis, the node below it, and its place between that node and the next, from 0 to 1.
     places: [Vec<(usize, f32)>; 3],
-    /// Coordinates of nodes along x. Units: world.
+    /// The coordinates of nodes along x. Units: world.
     xs: Vec<f64>,
     /// World units between nodes.
     step: f64,
-    /// For both noises, along x for each y and z, y first.
+    /// The rows of both noises along x, for each y and z, y fastest.
     rows: [Vec<Option<NoiseRow>>; 2],
-    /// Noise at the nodes of the line that is being interpolated.
+    /// The noise at the nodes of the row that is being interpolated.
     nodes: Vec<[f32; 4]>,
 }
 
@@ -283,8 +283,8 @@ impl NoiseLattice {
         Self { first, size, places, xs, step, rows, nodes: Vec::new() }
     }
 
-    /// Interpolates a row of local y and z, and returns how often it evaluated noise. A value depends on nothing but its
-    /// position, whatever the region.
+    /// Interpolates the row with this local y and z, and returns the number of noise evaluations. A value depends only
+    /// on its position, whatever the region.
     fn row(&mut self, which: usize, octaves: &Octaves, line: [u32; 2], range: Range<usize>, row: &mut NoiseRow) -> u64 {
         let mut calls = 0;
         let [(y, share_y), (z, share_z)] = [self.places[1][line[0] as usize], self.places[2][line[1] as usize]];
@@ -295,7 +295,7 @@ impl NoiseLattice {
         for (step_z, share_z) in [(0, 1.0 - share_z), (1, share_z)] {
             for (step_y, share_y) in [(0, 1.0 - share_y), (1, share_y)] {
                 let share = share_y * share_z;
-                // Also so that no noise is evaluated for a share of nothing.
+                // Evaluate no noise for a share of zero.
                 if share == 0.0 {
                     continue;
                 }

@@ -1,4 +1,4 @@
-//! [`Solid`]: what is ground and what is air, composed of heights, noise and shapes.
+//! [`Solid`]: the solid part of a landscape, composed of heights, noise and shapes.
 
 use bevy_reflect::Reflect;
 use bevy_reflect::std_traits::ReflectDefault;
@@ -6,9 +6,9 @@ use bevy_reflect::std_traits::ReflectDefault;
 use super::{Layer, MOST_NESTED};
 use crate::source::{Fractal, Sdf, SourceError, check, check_length};
 
-/// A part of space that is filled: the ground below heights, the room of caves, a shape, or several of them combined.
+/// A solid: the ground below heights, the space of caves or tunnels, a shape, or a combination of several.
 ///
-/// [`Caves`] and [`Tunnels`] are solids like the others, which are there to be taken away:
+/// [`Caves`] and [`Tunnels`] are solids like the others, but are meant to be subtracted:
 ///
 /// ```
 /// use bevy_marchless::source::{Caves, Fractal, Layer, Sdf, Solid, Tunnels};
@@ -28,31 +28,32 @@ pub enum Solid {
     Everything,
     /// Everything below heights.
     Ground(Layer),
-    /// Where 3-D noise is above a threshold.
+    /// All points where 3-D noise is above a threshold.
     Caves(Caves),
     /// Winding tubes along which two 3-D noises are near 0.
     Tunnels(Tunnels),
-    /// A shape, of its own materials.
+    /// A shape, with its own materials.
     Shape(Sdf),
-    /// Whatever lies in any part, of the material of the one that reaches out farthest.
+    /// All points in any part. Where parts overlap, the part that reaches out farthest gives the material.
     Union(Vec<Solid>),
-    /// Whatever lies in all parts, of the first one's material. An intersection of nothing is air.
+    /// The points that lie in all parts, with the first part's material. An intersection without parts is air.
     Intersection(Vec<Solid>),
-    /// Whatever lies in the first part and in none of the others, of the first one's material.
+    /// The points of the first part that lie in no other part, with the first part's material.
     Subtraction(Vec<Solid>),
 }
 
-/// Where 3-D noise is above a threshold: rooms and passages when subtracted, islands and overhangs when not.
+/// All points where 3-D noise is above a threshold: rooms and passages if subtracted, else islands and overhangs.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Caves {
     /// The noise; its `zoom` is about the distance between caves. Default: 3 octaves, a zoom of 40.
     pub noise: Fractal,
-    /// At 1 there is nothing, at 0 half of the space, at −1 all of it. Limit: −1..=1. Default: 0.15.
+    /// The noise value above which points belong to caves: 1 gives no caves, 0 half of the space, −1 all of it.
+    /// Limit: −1..=1. Default: 0.15.
     pub threshold: f64,
-    /// The noise is evaluated at every n-th sample along each axis, and interpolated (trilinear) between: 1 is the
-    /// finest, 2 needs an eighth of the noise, 4 a sixty-fourth, and features finer than that get lost. Units: samples.
+    /// The spacing of noise evaluations along each axis; samples between them are interpolated (trilinear). 1 is the
+    /// finest, 2 needs an eighth of the noise, 4 a sixty-fourth. Features finer than this get lost. Units: samples.
     /// Limit: 1..=16. Default: 1.
     pub lattice: u32,
 }
@@ -64,7 +65,7 @@ impl Default for Caves {
 }
 
 impl Caves {
-    /// Says what is wrong with the settings, if anything is.
+    /// Checks the settings.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -80,11 +81,11 @@ impl Caves {
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Tunnels {
-    /// One noise; the other is the same with another seed. Default: 2 octaves, a zoom of 90.
+    /// The first noise; the second differs only in its seed. Default: 2 octaves, a zoom of 90.
     pub noise: Fractal,
-    /// About how far a tunnel reaches from its middle. Units: world. Limit: > 0. Default: 4.
+    /// The approximate radius of tunnels. Units: world. Limit: > 0. Default: 4.
     pub radius: f64,
-    /// As of [`Caves::lattice`]. Default: 1.
+    /// The spacing of noise evaluations; see [`Caves::lattice`]. Default: 1.
     pub lattice: u32,
 }
 
@@ -96,7 +97,7 @@ impl Default for Tunnels {
 }
 
 impl Tunnels {
-    /// Says what is wrong with the settings, if anything is.
+    /// Checks the settings.
     ///
     /// # Errors
     /// [`SourceError::Setting`] for the first number that is out of its range.
@@ -112,7 +113,7 @@ fn check_lattice(lattice: u32) -> Result<(), SourceError> {
 }
 
 impl Default for Solid {
-    /// Hills as of [`NoiseHeightsSettings`](crate::source::NoiseHeightsSettings).
+    /// The hills of the default [`NoiseHeightsSettings`](crate::source::NoiseHeightsSettings).
     fn default() -> Self {
         Self::Ground(56.0 + Layer::noise(Fractal::default(), 52.0))
     }
@@ -143,7 +144,7 @@ impl From<Sdf> for Solid {
 }
 
 impl Solid {
-    /// Both solids.
+    /// The union of both solids.
     #[must_use]
     pub fn union(self, other: impl Into<Self>) -> Self {
         match self {
@@ -152,7 +153,7 @@ impl Solid {
         }
     }
 
-    /// What lies in both solids.
+    /// The intersection of both solids, with this one's material.
     #[must_use]
     pub fn intersection(self, other: impl Into<Self>) -> Self {
         match self {
@@ -170,7 +171,7 @@ impl Solid {
         }
     }
 
-    /// Says what is wrong with the solid, if anything is.
+    /// Checks the solid and all parts of it.
     ///
     /// # Errors
     /// [`SourceError`] for the first number that is out of its range, and for solids and layers nested more than 32
