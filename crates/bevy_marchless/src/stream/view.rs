@@ -24,7 +24,8 @@ pub(super) struct ViewFinder<'a> {
 }
 
 impl ViewFinder<'_> {
-    /// What a viewer sees; `None` where that cannot be said.
+    /// What a viewer sees of the terrain; `None` where that cannot be said. `known`: its latest view, and what that was
+    /// made from.
     pub(super) fn at(
         &mut self,
         terrain: Entity,
@@ -33,36 +34,14 @@ impl ViewFinder<'_> {
         place: &GlobalTransform,
         known: Option<(TerrainViewer, View)>,
     ) -> Option<View> {
-        let Some(to_terrain) = self.to_terrain.filter(|to_terrain| to_terrain.is_finite()) else {
-            self.warn(terrain, terrain, || {
-                format!("terrain {terrain} cannot be followed: its transform has no inverse")
-            });
-            return None;
-        };
+        let to_terrain = self.inverse_transform(terrain)?;
         let cells = f64::from(self.terrain.chunk_cells);
-        let position = place.translation();
-        let at = to_terrain.transform_point3(position.as_dvec3()) / (f64::from(self.terrain.voxel_size) * cells);
-        let at = at.to_array();
+        let at = to_terrain.transform_point3(place.translation().as_dvec3());
+        let at = (at / (f64::from(self.terrain.voxel_size) * cells)).to_array();
+        self.check(terrain, viewer, settings, place, at)?;
         // `f64::min` would turn NaN into a number.
         let radii = settings.radii.as_dvec3().to_array().map(|v| if v > FARTHEST { FARTHEST } else { v } / cells);
         let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
-        if !at.iter().all(|v| v.is_finite()) {
-            self.warn(terrain, viewer, || {
-                format!("terrain viewer {viewer} has no finite position ({position}); it loads nothing new")
-            });
-            return None;
-        }
-        // Not a number is not above 0 either.
-        if !(radii.iter().all(|radius| *radius > 0.0) && margin >= 0.0 && samples >= 0.0) {
-            let TerrainViewer { radii, margin, sample_radius } = settings;
-            self.warn(terrain, viewer, || {
-                format!(
-                    "terrain viewer {viewer} needs radii above 0 and a margin and a sample radius of 0 or more, in voxels, \
-                     but has {radii}, {margin} and {sample_radius}; it loads nothing new"
-                )
-            });
-            return None;
-        }
         let middle = at.map(|v| (v / STEP).round() * STEP);
         let extent = self.terrain.chunk_region();
         // In steps, so that looking around changes little.
@@ -76,22 +55,69 @@ impl ViewFinder<'_> {
         }
         let whole = LoadRegion::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
         let range = limited(whole);
-        if range == whole {
-            self.reported.remove(&(terrain, viewer));
-        } else {
-            self.warn(terrain, viewer, || {
-                format!(
-                    "terrain viewer {viewer} asks for more than {} chunks with radii of {} voxels; they are scaled down",
-                    Terrain::MAX_CHUNKS,
-                    settings.radii
-                )
-            });
-        }
+        self.note_scaled_radii(terrain, viewer, settings, range != whole);
         let margin = limited_margin(&range, margin);
         // Where all that may be loaded lies within, none are dropped.
         let drops = samples < range.longest() + margin + 2.0;
         let samples = drops.then(|| LoadRegion::ellipsoid(middle, [samples + STEP; 3], extent));
         Some(View::new(range, margin, samples, forward))
+    }
+
+    /// From world space to the terrain's own; `None`, and a warning, where that is not finite.
+    fn inverse_transform(&mut self, terrain: Entity) -> Option<DAffine3> {
+        let to_terrain = self.to_terrain.filter(|to_terrain| to_terrain.is_finite());
+        if to_terrain.is_none() {
+            self.warn(terrain, terrain, || {
+                format!("terrain {terrain} cannot be followed: its transform has no inverse")
+            });
+        }
+        to_terrain
+    }
+
+    /// Refuses, with a warning, a viewer at no finite place and settings that are out of range. `at`: where it is, in
+    /// chunks.
+    fn check(
+        &mut self,
+        terrain: Entity,
+        viewer: Entity,
+        settings: &TerrainViewer,
+        place: &GlobalTransform,
+        at: [f64; 3],
+    ) -> Option<()> {
+        if !at.iter().all(|v| v.is_finite()) {
+            let position = place.translation();
+            self.warn(terrain, viewer, || {
+                format!("terrain viewer {viewer} has no finite position ({position}); it loads nothing new")
+            });
+            return None;
+        }
+        let TerrainViewer { radii, margin, sample_radius } = *settings;
+        // NaN is not above 0 either.
+        if !(radii.to_array().iter().all(|radius| *radius > 0.0) && margin >= 0.0 && sample_radius >= 0.0) {
+            self.warn(terrain, viewer, || {
+                format!(
+                    "terrain viewer {viewer} needs radii above 0 and a margin and a sample radius of 0 or more, in voxels, \
+                     but has {radii}, {margin} and {sample_radius}; it loads nothing new"
+                )
+            });
+            return None;
+        }
+        Some(())
+    }
+
+    /// Warns once of radii that had to be scaled down.
+    fn note_scaled_radii(&mut self, terrain: Entity, viewer: Entity, settings: &TerrainViewer, are_scaled: bool) {
+        if !are_scaled {
+            self.reported.remove(&(terrain, viewer));
+            return;
+        }
+        self.warn(terrain, viewer, || {
+            format!(
+                "terrain viewer {viewer} asks for more than {} chunks with radii of {} voxels; they are scaled down",
+                Terrain::MAX_CHUNKS,
+                settings.radii
+            )
+        });
     }
 
     fn warn(&mut self, terrain: Entity, about: Entity, text: impl FnOnce() -> String) {
