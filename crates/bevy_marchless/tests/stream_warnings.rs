@@ -1,4 +1,4 @@
-//! What is wrong is said once, in a sentence, and not in every update.
+//! Each problem is logged once, in a sentence, and not in every update.
 
 #[path = "suite/common/mod.rs"]
 mod common;
@@ -13,7 +13,7 @@ use bevy_transform::components::Transform;
 use common::stream::*;
 use common::*;
 
-/// Sets a world up, updates it 100 times while all is well and 100 times after a change, and returns what was said.
+/// Sets an app up, runs 100 updates without a problem and 100 after a change, and returns the log messages.
 fn said(terrain: Terrain, change: impl Fn(&mut App, Entity, Entity)) -> Vec<String> {
     let mut app = app_with_budget(16);
     app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_millis(1);
@@ -37,7 +37,7 @@ fn see(app: &mut App, viewer: Entity, radius: f32) {
     app.world_mut().get_mut::<TerrainViewer>(viewer).unwrap().radii = Vec3::splat(radius);
 }
 
-/// One test, since a process has one log.
+/// A single test, because a process has one log.
 #[test]
 fn each_fault_is_reported_once() {
     log::record();

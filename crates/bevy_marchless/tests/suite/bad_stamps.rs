@@ -1,4 +1,4 @@
-//! Stamps with bad numbers, or for nobody, are dropped, and change nothing.
+//! Stamps with bad numbers, or on entities without a terrain, are dropped and change nothing.
 
 use crate::common::*;
 use bevy_marchless::prelude::*;

@@ -1,4 +1,4 @@
-//! Chunks in the cells of a big space: what holds at the origin holds at ten million voxels, bit for bit.
+//! Chunks in the cells of a big space: results at the origin and at ten million voxels are equal bit for bit.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,17 +20,17 @@ use marchless::MeshBuffer;
 const CELLS: i32 = 16;
 /// Ten million voxels along each axis, in chunks.
 const FAR: IVec3 = IVec3::new(625_000, -625_000, 625_000);
-/// The edge of a cell of the grid, of which ten million are a multiple. [Units: world]
+/// The edge of a cell of the grid, which divides ten million. [Units: world]
 const EDGE: f32 = 2_000.0;
 
-/// A ball of radius 12 in the middle of 2 × 2 × 2 chunks whose lowest is `offset`.
+/// A ball of radius 12 in the middle of 2 × 2 × 2 chunks, the lowest of which is at `offset`.
 fn ball_at(offset: IVec3) -> Terrain {
     let middle = (offset * CELLS + 16).as_dvec3();
     let source = move |p: [f64; 3]| DVec3::from(p).distance(middle) - 12.0;
     Terrain::new(source).with_chunk_cells(CELLS as u32).with_extent(Extent { min: offset, max: offset + 2 })
 }
 
-/// An app with a big space instead of Bevy's propagation.
+/// An app with a big space instead of Bevy's own propagation.
 fn space_app(minimal: bool) -> App {
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), TimePlugin, AssetPlugin::default(), MeshPlugin, MarchlessPlugins));
@@ -43,7 +43,7 @@ fn space_app(minimal: bool) -> App {
     app
 }
 
-/// In every update: each chunk of a grid has a cell, and is where it belongs relative to the floating origin.
+/// Checks in every update that each chunk of a grid has a cell, and the right place relative to the floating origin.
 fn chunks_are_in_their_cells(
     chunks: Query<(&Chunk, Option<&CellCoord>, &Transform, &GlobalTransform)>,
     terrains: Query<(&TerrainVolume, &Grid)>,
@@ -64,7 +64,7 @@ fn chunks_are_in_their_cells(
     }
 }
 
-/// A terrain that is a grid, and the floating origin in that cell, 40 units above its middle.
+/// Spawns a terrain that is a grid, and the floating origin in this cell, 40 units above its middle.
 fn spawn(app: &mut App, terrain: Terrain, edge: f32, cell: CellCoord) -> (Entity, Entity) {
     let root = app.world_mut().spawn(BigSpaceRootBundle::default()).id();
     let grid = (terrain, Grid::new(edge, 100.0), CellCoord::ZERO, ChildOf(root));
@@ -74,7 +74,7 @@ fn spawn(app: &mut App, terrain: Terrain, edge: f32, cell: CellCoord) -> (Entity
     (terrain, origin)
 }
 
-/// The same ball so many chunks away, with the floating origin beside it.
+/// The same ball, `offset` chunks from the origin, with the floating origin beside it.
 fn settled_at(offset: IVec3) -> (App, Entity, Entity) {
     let mut app = space_app(false);
     let (terrain, origin) = spawn(&mut app, ball_at(offset), EDGE, cell_of(offset));
@@ -83,14 +83,15 @@ fn settled_at(offset: IVec3) -> (App, Entity, Entity) {
     (app, terrain, origin)
 }
 
-/// The cell of the chunk at `offset`, which is a multiple of cells away.
+/// The cell of the chunk at `offset`, which must be a whole number of cells away.
 fn cell_of(offset: IVec3) -> CellCoord {
     let cell = offset * CELLS / EDGE as i32;
     assert_eq!(cell * EDGE as i32, offset * CELLS);
     CellCoord::ZERO + cell
 }
 
-/// All that is drawn: per position relative to `offset` the place relative to the floating origin, bit for bit, and the mesh.
+/// All drawn chunks: by position relative to `offset`, the place relative to the floating origin, bit for bit, and the
+/// mesh.
 fn drawn(app: &mut App, offset: IVec3) -> BTreeMap<[i32; 3], ([u32; 12], Arc<MeshBuffer>)> {
     let mut chunks = app.world_mut().query::<(&Chunk, &GlobalTransform, &ChunkGeometry)>();
     let drawn = chunks.iter(app.world()).map(|(chunk, global, geometry)| {
@@ -114,7 +115,7 @@ fn hits(app: &mut App) -> Vec<Option<TerrainHit>> {
     app.world_mut().run_system_once(cast).expect("it runs")
 }
 
-/// Asserts that both show the same, `FAR` apart, and that the same rays hit the same.
+/// Asserts that both apps, `FAR` apart, draw the same, and that the same rays hit the same points.
 fn assert_same(near: &mut App, far: &mut App) {
     assert!(!drawn(near, IVec3::ZERO).is_empty());
     assert_eq!(drawn(near, IVec3::ZERO), drawn(far, FAR));
@@ -139,7 +140,7 @@ fn ten_million_voxels_away_everything_is_the_same() {
     let mut awake = far.world_mut().query_filtered::<Entity, (With<Chunk>, Without<Stationary>)>();
     assert_eq!(awake.iter(far.world()).count(), 0, "propagation may pass over chunks");
 
-    // A stamp where the first ray hits, and one between the lattice's points.
+    // A stamp where the first ray hits, and one between lattice points.
     for (app, terrain, offset) in [(&mut near, near_terrain, IVec3::ZERO), (&mut far, far_terrain, FAR * CELLS)] {
         let hit = hits(app)[0].expect("the ball is in the way");
         app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(hit.lattice, 4.0)));
@@ -150,7 +151,7 @@ fn ten_million_voxels_away_everything_is_the_same() {
     }
     assert_same(&mut near, &mut far);
 
-    // The floating origin goes on to another cell, and all goes with it.
+    // The floating origin moves to another cell, and everything follows.
     for (app, origin) in [(&mut near, near_origin), (&mut far, far_origin)] {
         app.world_mut().get_mut::<CellCoord>(origin).expect("it has a cell").x += 3;
         app.update();
@@ -176,11 +177,11 @@ fn a_viewer_loads_what_is_around_it() {
     };
     let (mut near, mut far) = (world(IVec3::ZERO), world(FAR));
     let mut former = BTreeMap::new();
-    // Where it is, within the same cell, and into another one.
+    // At its own place, within the same cell, and in another one.
     for step in [0.0, 300.0, EDGE] {
         for (app, terrain, viewer) in [&mut near, &mut far] {
             app.world_mut().get_mut::<Transform>(*viewer).expect("it has a place").translation.x += step;
-            // It is followed as soon as its new place has been propagated.
+            // The terrain follows as soon as the new place has been propagated.
             app.update();
             app.update();
             settle(app, *terrain);
@@ -195,7 +196,7 @@ fn a_viewer_loads_what_is_around_it() {
 
 #[test]
 fn positions_in_world_space_and_in_the_lattice_belong_together() {
-    // The distance of the floating origin's cell is no `f32`.
+    // An `f32` cannot hold the distance of the floating origin's cell.
     let (edge, cell) = (500.5, CellCoord::new(19_981, -19_981, 19_981));
     let mut app = space_app(false);
     let (terrain, _) = spawn(&mut app, ball_at(FAR), edge, cell);
@@ -231,7 +232,7 @@ fn voxels_of_any_size_are_in_their_places() {
                 chunk.position
             );
         }
-        // It was drawn with this size; now with another one, and the chunks move.
+        // Drawn with this voxel size, then with another one: the chunks move.
         app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain").voxel_size = 2.0 * size;
         app.update();
         settle(&mut app, terrain);
@@ -248,7 +249,7 @@ fn a_terrain_may_become_a_grid_and_cease_to_be_one() {
         let sleeping = app.world_mut().query_filtered::<&Chunk, With<Stationary>>().iter(app.world()).count();
         assert_eq!(sleeping == 0, minimal, "without its plugin, `Stationary` costs more than it saves");
         let expected = drawn(&mut app, IVec3::ZERO);
-        // Another grid, with smaller cells; chunks change theirs.
+        // Another grid, with smaller cells: the chunks change their cells.
         app.world_mut().entity_mut(terrain).insert(Grid::new(10.0, 1.0));
         app.update();
         app.update();
@@ -276,7 +277,7 @@ fn a_terrain_that_is_no_grid_stays_where_the_space_puts_it() {
     let terrain = app.world_mut().spawn((ball(), cell, ChildOf(grid))).id();
     let origin = app.world_mut().spawn((FloatingOrigin, cell, Transform::default(), ChildOf(grid))).id();
     settle(&mut app, terrain);
-    // At the origin of world space, like what nobody has propagated.
+    // At the origin of world space, as if its transform had not been propagated.
     assert_eq!(app.world().get::<GlobalTransform>(terrain), Some(&GlobalTransform::IDENTITY));
     *app.world_mut().get_mut::<CellCoord>(origin).unwrap() = CellCoord::new(2, 0, 0);
     (0..3).for_each(|_| app.update());

@@ -1,4 +1,4 @@
-//! Bits answer as a plain loop over the samples does, before and after edits, and find what hangs free.
+//! Bits agree with a plain loop over the samples, before and after edits, and loose islands are found.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use bevy_math::{DVec3, IVec3, UVec3, Vec3};
 use bevy_tasks::block_on;
 use marchless::Shape;
 
-/// What `question` answers in a system.
+/// Runs `question` in a system and returns its result.
 fn ask<T: Send + 'static>(app: &mut App, question: impl Fn(&TerrainBits) -> T + Send + Sync + 'static) -> T {
     app.world_mut().run_system_once(move |bits: TerrainBits| question(&bits)).unwrap()
 }
@@ -23,7 +23,7 @@ fn stamp(app: &mut App, stamp: Stamp) {
     app.update();
 }
 
-/// What is solid, sample by sample, within the outermost planes.
+/// The solid points, sample by sample, inside the outermost planes.
 struct Oracle(BTreeSet<[i32; 3]>);
 
 impl Oracle {
@@ -39,7 +39,7 @@ impl Oracle {
         self.0.contains(&point)
     }
 
-    /// The points that a way along the axes leads to.
+    /// The points that a path along the axes reaches.
     fn island(&self, first: [i32; 3], region: Region) -> BTreeSet<[i32; 3]> {
         let mut found = BTreeSet::new();
         let mut next = vec![first];
@@ -164,7 +164,7 @@ fn answers_are_those_of_the_samples_at_other_isovalues_and_in_uniform_chunks() {
         settle(&mut app, terrain);
         assert_answers(&mut app, terrain);
     }
-    // Ground and air without a surface, but for the walls: most chunks are uniform.
+    // Ground and air without a surface, except for the walls: most chunks are uniform.
     let deep = Sdf::cuboid(DVec3::new(40.0, -51.5, 40.0), DVec3::splat(100.0));
     let terrain = settled(&mut app, Terrain::new(deep).with_extent(UVec3::new(5, 6, 5)).with_chunk_cells(16));
     let grid = volume(&app, terrain).grid();
@@ -217,7 +217,7 @@ fn questions_without_an_answer_say_why() {
     for region in [Region::new([i32::MIN; 3], [i32::MAX; 3]), Region::new([0; 3], [1, 1 << 12, 1 << 11])] {
         let bits = ask(&mut app, move |bits| bits.bits(terrain, region));
         assert_eq!(bits, Err(TerrainBitsError::TooLarge { region }));
-        // What lies outside the terrain is nothing but air.
+        // All points outside the terrain are air.
         let islands = ask(&mut app, move |bits| bits.islands(terrain, region)).expect("the terrain is small");
         assert!(islands.len() <= 1 && islands.iter().all(Island::touches_boundary));
         assert!(ask(&mut app, move |bits| bits.is_solid(terrain, region)) == Ok(false));
@@ -251,7 +251,7 @@ fn what_is_connected_depends_on_the_box_and_on_edits() {
     assert!(connected(&mut app, left, right, whole, Solid));
     assert!(!connected(&mut app, left, right, whole, Air), "they are not in the air");
     assert!(!connected(&mut app, left, IVec3::new(28, 20, 16), whole, Solid), "above the ground");
-    // A trench from wall to wall, down to the bottom but for a layer of two voxels.
+    // A trench from wall to wall, down to the bottom except for a layer of two voxels.
     let trench = BrushShape::cuboid(Vec3::new(16.0, 18.0, 16.0), Vec3::new(2.0, 15.5, 30.0));
     stamp(&mut app, Stamp::dig(terrain, trench));
     assert!(connected(&mut app, left, right, whole, Solid), "along the bottom");
@@ -290,7 +290,7 @@ fn app_with_edits() -> App {
     app
 }
 
-/// Applies a stamp and finds what hangs free around what it has changed.
+/// Applies a stamp and returns the loose islands around its changes.
 fn loosened_by(app: &mut App, by: Stamp) -> Vec<Island> {
     stamp(app, by);
     app.update();
@@ -321,7 +321,7 @@ fn a_head_hangs_free_once_its_pillar_is_cut_and_can_be_dug_out() {
     let islands = ask(&mut app, move |bits| bits.islands(terrain, whole)).unwrap();
     let [ground, same] = &islands[..] else { panic!("the ground and the head: {islands:?}") };
     assert!(ground.touches_boundary() && same == head && ground.size() + head.size() == oracle.0.len());
-    // Too small a box cuts through it, so that nobody knows.
+    // A box that is too small cuts through it, so its support is unknown.
     let [min, max] = [head.bounds().min, head.bounds().max];
     let small = Region::new([min[0] - 1, min[1] + 2, min[2] - 1], max.map(|v| v + 1));
     let islands = ask(&mut app, move |bits| bits.islands(terrain, small)).unwrap();

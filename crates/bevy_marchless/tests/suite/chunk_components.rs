@@ -1,4 +1,4 @@
-//! Chunks have the components that a game puts on their terrain.
+//! Chunks have the components that a game gives to their terrain.
 
 use crate::common::*;
 use bevy_app::{App, PostUpdate};
@@ -16,7 +16,7 @@ struct Tag(u32);
 #[component(immutable)]
 struct Fixed(u32);
 
-/// On one chunk, by the game.
+/// A component that the game gives to one chunk.
 #[derive(Component)]
 struct Own;
 
@@ -26,7 +26,7 @@ fn app_with_tags() -> App {
     app
 }
 
-/// What the chunks of a terrain have, disabled ones included.
+/// The tags of a terrain's chunks, disabled ones included.
 fn found<C: Component + Clone>(app: &mut App, terrain: Entity) -> Vec<Option<C>> {
     let mut chunks = app.world_mut().query_filtered::<(&Chunk, Option<&C>), Allow<Disabled>>();
     let of_terrain = chunks.iter(app.world()).filter(|(chunk, _)| chunk.terrain == terrain);
@@ -71,7 +71,7 @@ fn chunks_follow_what_their_terrain_gets_changes_and_loses() {
     let terrain = settled(&mut app, ball());
     let other = app.world_mut().spawn((ball(), Tag(1))).id();
     settle(&mut app, other);
-    // A child that is no chunk.
+    // A child that is not a chunk.
     let child = app.world_mut().spawn(ChildOf(terrain)).id();
     assert_eq!(found::<Tag>(&mut app, terrain), vec![None; 8]);
 
@@ -157,7 +157,7 @@ fn a_chunk_keeps_a_value_of_its_own_until_the_terrains_changes() {
     let decorate = |chunks: Query<(Entity, &Chunk), Added<Chunk>>, mut commands: Commands| {
         chunks.iter().for_each(|(entity, chunk)| give_own(chunk, &mut commands.entity(entity)));
     };
-    // The game's observer before and after the plugin's, and its system.
+    // The game's observer, before and after the plugin's, and the game's system.
     for way in 0..3 {
         let mut app = app_with_budget(2);
         if way == 0 {

@@ -1,4 +1,4 @@
-//! Samples inserted by hand get a mesh, and another after each change.
+//! Standalone samples get a mesh, and another after each change.
 
 use crate::common::*;
 use bevy_camera::primitives::Aabb;

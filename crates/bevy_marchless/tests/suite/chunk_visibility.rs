@@ -1,4 +1,4 @@
-//! A single chunk may be hidden: edits leave it so, and rays hit it all the same.
+//! A single chunk may be hidden: edits leave it hidden, and rays still hit it.
 
 use crate::common::*;
 use bevy_camera::visibility::Visibility;

@@ -7,7 +7,7 @@ use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 
-/// Asserts that each chunk is one of its terrain's own, and that there are as many as terrains draw.
+/// Asserts that each chunk belongs to its terrain, and that there are as many chunks as the terrains draw.
 fn assert_no_copies(app: &mut App, terrains: &[Entity]) {
     let mut chunks = app.world_mut().query::<(Entity, &Chunk, &ChildOf)>();
     let all: Vec<_> =
@@ -33,7 +33,7 @@ fn a_clone_makes_its_own_chunks_and_goes_its_own_way() {
         settle(&mut app, clone);
         app.update();
         assert_no_copies(&mut app, &[terrain, clone]);
-        // What was dug is not among the settings.
+        // Edits are not part of the settings.
         assert_as_new(&mut app, clone, &[]);
         assert_as_new(&mut app, terrain, &[dig(terrain)]);
         app.world_mut().write_message(dig(clone));
@@ -67,7 +67,7 @@ fn chunks_that_nobody_manages_go() {
     let own = volume(&app, terrain).chunk_entity(position).expect("it is drawn");
     let copy = app.world_mut().spawn_empty().id();
     EntityCloner::build_opt_out(app.world_mut()).clone_entity(own, copy);
-    // Once it is no chunk, a copy is the game's own.
+    // A copy that is not a chunk belongs to the game.
     let debris = app.world_mut().spawn_empty().id();
     EntityCloner::build_opt_out(app.world_mut()).clone_entity(own, debris);
     app.world_mut().entity_mut(debris).remove::<(Chunk, ChildOf)>();

@@ -1,4 +1,4 @@
-//! The union of all chunks drawn of a terrain is closed, its borders equal bit for bit.
+//! The union of a terrain's drawn chunks is closed, and their borders are equal bit for bit.
 
 use crate::common::*;
 use bevy_marchless::prelude::*;

@@ -34,7 +34,7 @@ fn despawning_a_terrain_ends_its_work() {
     let reached = gate.reached();
     gate.open();
     update_until(&mut app, |_| Arc::strong_count(&alive) == 1);
-    // Each thread finishes the chunk that it is at; none of the other chunks is begun.
+    // Each thread finishes its current chunk; no other chunk is started.
     let begun = (gate.reached() - reached).div_ceil(8 * 8 * 8) + 1;
     assert!(begun <= 5, "{begun} of 64 chunks were sampled for nobody");
 }

@@ -1,4 +1,4 @@
-//! Diagnostics tell what is going on.
+//! Diagnostics report the plugin's work.
 
 use std::time::Duration;
 

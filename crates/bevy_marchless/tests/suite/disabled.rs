@@ -1,4 +1,4 @@
-//! A terrain whose entity is disabled for a while goes on where it was: nothing is lost, and stamps wait.
+//! A terrain that was disabled for a while continues where it was: nothing is lost, and stamps wait.
 
 use crate::common::*;
 use bevy_app::App;

@@ -8,7 +8,7 @@ use bevy_marchless::stats::TerrainStats;
 use bevy_math::{IVec3, Vec3};
 use std::sync::Arc;
 
-/// Applies a stamp, updates once, and returns the positions of the chunks whose geometry is another one.
+/// Applies a stamp, updates once, and returns the positions of the chunks whose geometry changed.
 fn changed_by(app: &mut App, stamp: Stamp) -> Vec<IVec3> {
     let before = geometry(app, stamp.terrain);
     app.world_mut().write_message(stamp);
@@ -50,7 +50,7 @@ fn what_changes_out_of_sight_is_shown_without_meshing() {
     assert_eq!(meshed(&app), before);
     assert!(volume(&app, terrain).is_settled());
     assert_eq!(volume(&app, terrain).shown().get([14, 7, 14]).material, 4);
-    // In the same update, what is out of sight does not take what shows from the screen.
+    // An edit out of sight, in the same update, does not take drawn chunks off the screen.
     app.world_mut().write_message(Stamp::dig(terrain, ball(16.0, 5.0)));
     changed_by(&mut app, Stamp::paint(terrain, ball(4.0, 2.0), 5));
     assert!(meshed(&app) > before);

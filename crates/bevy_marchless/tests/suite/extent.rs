@@ -1,4 +1,4 @@
-//! Another extent: what stays in it stays as it is, edits too.
+//! A change of the extent leaves everything inside the new one as it is, edits included.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -36,7 +36,7 @@ fn dig(app: &mut App, terrain: Entity, at: Vec3, radius: f32) -> Stamp {
 fn a_layer_more_leaves_chunks_and_edits_as_they_are() {
     let mut app = app();
     let terrain = settled(&mut app, hills(UVec3::new(4, 2, 4)));
-    // In the middle, and over the border that is about to move.
+    // Stamps in the middle, and across the border that is about to move.
     let stamps = [
         dig(&mut app, terrain, Vec3::new(12.0, 9.0, 12.0), 4.0),
         dig(&mut app, terrain, Vec3::new(31.0, 9.0, 12.0), 5.0),
@@ -55,7 +55,7 @@ fn edits_come_back_with_their_chunks() {
     let mut app = app();
     let terrain = settled(&mut app, hills(UVec3::new(4, 2, 4)));
     let mut stamps = vec![dig(&mut app, terrain, Vec3::new(26.0, 9.0, 12.0), 4.0)];
-    // So many that the samples are kept instead of the stamps.
+    // Enough stamps that samples are kept instead.
     for step in 0u8..80 {
         stamps.push(dig(&mut app, terrain, Vec3::new(27.0, 9.0 - 0.05 * f32::from(step), 27.0), 3.0));
     }
@@ -63,7 +63,7 @@ fn edits_come_back_with_their_chunks() {
     resize(&mut app, terrain, UVec3::new(3, 2, 3));
     settle(&mut app, terrain);
     assert_as_new(&mut app, terrain, &stamps);
-    // What reaches over the border counts beyond it, too, and what lies wholly beyond does nothing.
+    // A stamp across the border also counts beyond it; a stamp wholly beyond it does nothing.
     stamps.push(dig(&mut app, terrain, Vec3::new(23.0, 9.0, 27.0), 5.0));
     dig(&mut app, terrain, Vec3::new(200.0, 9.0, 12.0), 5.0);
     resize(&mut app, terrain, UVec3::new(5, 2, 4));

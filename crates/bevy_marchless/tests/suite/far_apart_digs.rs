@@ -1,4 +1,4 @@
-//! Digs far apart in one update all show in it, however many they are, and each region is reported by itself.
+//! Any number of digs far apart in one update all show in it, and each region is reported separately.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ fn digs(terrain: Entity, count: u32, apart: f32) -> Vec<Stamp> {
     (0..count).map(|index| Stamp::dig(terrain, BrushShape::sphere(at(index), 2.0))).collect()
 }
 
-/// Writes stamps, updates once, and returns what was reported, in order of place.
+/// Writes stamps, updates once, and returns the reports, sorted by place.
 fn apply(app: &mut App, stamps: &[Stamp]) -> Vec<TerrainEdited> {
     app.world_mut().write_message_batch(stamps.iter().copied());
     app.update();
@@ -31,7 +31,7 @@ fn apply(app: &mut App, stamps: &[Stamp]) -> Vec<TerrainEdited> {
     edits
 }
 
-/// What is reported of a region: a box around all samples that changed, and how many became air or solid.
+/// The report of a region: the box around all changed samples, and how many became air or solid.
 fn expected(terrain: Entity, before: &Grid<i16>, after: &Grid<i16>, region: Region) -> TerrainEdited {
     let mut edit =
         TerrainEdited { terrain, min: IVec3::MAX, max: IVec3::MIN, added: BTreeMap::new(), removed: BTreeMap::new() };

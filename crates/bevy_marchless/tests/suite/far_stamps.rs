@@ -1,4 +1,4 @@
-//! Stamps far from the origin change what they would change at the origin, moved.
+//! Stamps far from the origin have the same effect as at the origin.
 
 use bevy_ecs::entity::Entity;
 use bevy_marchless::prelude::*;

@@ -1,4 +1,4 @@
-//! A terrain follows its world file while the game runs, and stays as it is when the file is no good.
+//! A terrain follows its file while the game runs, and stays as it is if the file is bad.
 
 use std::fs;
 use std::io::{self, Write};
@@ -19,7 +19,7 @@ use bevy_transform::TransformPlugin;
 use marchless::MeshBuffer;
 use tempfile::TempDir;
 
-/// A game whose assets lie in a folder of its own.
+/// A game with an asset folder of its own.
 struct Game {
     app: App,
     folder: TempDir,
@@ -42,7 +42,7 @@ impl Game {
         self.app.world().resource::<AssetServer>()
     }
 
-    /// A terrain of a world file, loaded and drawn.
+    /// Spawns a terrain with a terrain file, and waits until it is loaded and drawn.
     fn spawn(&mut self, name: &str) -> Entity {
         let handle = self.server().load(name.to_owned());
         let entity = self.app.world_mut().spawn(TerrainFile(handle)).id();
@@ -58,14 +58,14 @@ impl Game {
         self.app.world().get::<Terrain>(entity).unwrap()
     }
 
-    /// Updates until the terrain's world is loaded, taken over and drawn.
+    /// Updates until the terrain's file is loaded, applied and drawn.
     fn loaded(&mut self, entity: Entity) {
         let handle = self.handle(entity);
         update_until(&mut self.app, |app| app.world().resource::<AssetServer>().is_loaded(&handle));
         self.drawn(entity);
     }
 
-    /// Updates until what has changed is drawn.
+    /// Updates until all changes are drawn.
     fn drawn(&mut self, entity: Entity) {
         for _ in 0..3 {
             self.app.update();
@@ -73,7 +73,7 @@ impl Game {
         settle(&mut self.app, entity);
     }
 
-    /// Writes the file anew, loads it again, and waits until `done`.
+    /// Writes the file again, reloads it, and waits until `done`.
     fn rewrite(&mut self, name: &str, bytes: impl AsRef<[u8]>, entity: Entity, done: impl Fn(&App) -> bool) {
         self.write(name, bytes);
         self.server().reload(name.to_owned());
@@ -81,7 +81,7 @@ impl Game {
         self.drawn(entity);
     }
 
-    /// Loads the file again and waits until that has failed and been told.
+    /// Reloads the file and waits until the failure has been logged.
     fn fail(&mut self, name: &str, bytes: impl AsRef<[u8]>, entity: Entity) {
         let before = warnings(name).len();
         let handle = self.handle(entity);
@@ -108,7 +108,7 @@ impl Game {
     }
 }
 
-/// What the module of worlds has warned of about a file, a line each.
+/// The warnings about a terrain file, one per line.
 fn warnings(name: &str) -> Vec<String> {
     static TEXT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
     static START: Once = Once::new();
@@ -182,7 +182,8 @@ fn only_what_differs_changes() {
         |chunks: &[(IVec3, Arc<MeshBuffer>)]| chunks.iter().map(|(_, mesh)| mesh.positions.clone()).collect::<Vec<_>>();
     assert_eq!(positions(&game.geometry(entity)), positions(&dug), "what was dug stays");
 
-    // The same world in other words, and by hand what the file does not change.
+    // The same description in other words, and a change of the `Terrain` itself in a setting that the file does not
+    // change.
     game.app.world_mut().get_mut::<Terrain>(entity).unwrap().voxel_size = 3.0;
     game.drawn(entity);
     game.dig(entity);
@@ -226,12 +227,12 @@ fn a_file_that_is_no_good_changes_nothing_and_is_told_once() {
     game.fail(name, "", entity);
     assert_eq!(game.geometry(entity), dug, "nothing is lost");
 
-    // Repaired: the same world as before.
+    // Repaired: the same description as before.
     game.rewrite(name, &good, entity, |app| {
         app.world().resource::<AssetServer>().is_loaded(&app.world().get::<TerrainFile>(entity).unwrap().0)
     });
     assert_eq!(game.geometry(entity), dug);
-    // And changed, and broken in the way that was told before.
+    // Changed, then broken in the way that was logged before.
     let source = game.terrain(entity).source.clone();
     game.rewrite(name, ball_text(10.0, ""), entity, |app| app.world().get::<Terrain>(entity).unwrap().source != source);
     assert_ne!(game.geometry(entity), dug);
@@ -328,7 +329,7 @@ fn a_height_map_is_read_with_its_world() {
     let before = game.geometry(entity);
     assert!(before.iter().any(|(_, mesh)| !mesh.is_empty()));
 
-    // The world's text is the same, the picture is not.
+    // The file's text stays the same, but the picture changes.
     let source = game.terrain(entity).source.clone();
     game.write("heights.png", grey_png(16, 16, |x, z| ((x + z) * 400) as u16));
     game.rewrite(name, text, entity, |app| app.world().get::<Terrain>(entity).unwrap().source != source);
@@ -377,7 +378,7 @@ fn stamps_wait_for_a_world_that_is_being_read() {
     game.write("bad.terrain.ron", "(");
     let at = Vec3::new(20.0, 14.0, 20.0);
     let dig = |terrain| Stamp::dig(terrain, BrushShape::sphere(at, 5.0));
-    // A new terrain, and one that is to become another.
+    // A new terrain, and a terrain that gets another file.
     let former = game.app.world_mut().spawn(ground_of_rock()).id();
     settle(&mut game.app, former);
     for entity in [game.app.world_mut().spawn_empty().id(), former] {
@@ -389,7 +390,7 @@ fn stamps_wait_for_a_world_that_is_being_read() {
         game.loaded(entity);
         assert_as_new(&mut game.app, entity, &[dig(entity)]);
     }
-    // A file that is no good makes nobody wait for ever, nor does one that is taken away.
+    // Neither a bad file nor a removed one makes a terrain wait for ever.
     let handle = game.server().load("bad.terrain.ron");
     game.app.world_mut().entity_mut(former).insert(TerrainFile(handle));
     game.app.world_mut().write_message(Stamp::add(former, BrushShape::sphere(at, 5.0), 2));

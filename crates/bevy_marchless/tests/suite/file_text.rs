@@ -1,4 +1,4 @@
-//! World files as text: what is written is read again, and whatever is wrong is told with its place.
+//! Terrain files as text: written files read back the same, and every error names its place.
 
 use std::fmt::Debug;
 
@@ -179,7 +179,7 @@ fn world() -> impl Strategy<Value = TerrainDescription> {
     })
 }
 
-/// Through the text of any RON, without the world format's short forms.
+/// Through plain RON text, without the short forms of terrain files.
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
     let text = ron::to_string(value).unwrap();
     assert_eq!(&ron::from_str::<T>(&text).unwrap_or_else(|error| panic!("{error} in {text}")), value, "{text}");
@@ -196,7 +196,7 @@ proptest! {
                 prop_assert_eq!(&read, &world);
                 prop_assert_eq!(read.to_ron().unwrap(), text);
             }
-            // Whatever could not be a terrain's settings is refused after it is read.
+            // Values that are not valid settings are refused after they are read.
             Err(DescriptionError::Source { .. } | DescriptionError::Terrain { .. }) => round_trip(&world),
             Err(error) => panic!("{error} in {text}"),
         }

@@ -1,4 +1,4 @@
-//! Stamps may be written, and reports read, in `FixedUpdate`, however often it runs in an update.
+//! Stamps may be written and reports read in `FixedUpdate`, however often it runs in an update.
 
 use core::time::Duration;
 
@@ -9,14 +9,14 @@ use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_time::{Fixed, Time, TimePlugin, TimeUpdateStrategy};
 
-/// How many stamps have been written, and how many cubic voxels they have removed.
+/// The number of stamps written, and the cubic voxels that they removed.
 #[derive(Resource, Default)]
 struct Work {
     stamps: u32,
     removed: u64,
 }
 
-/// The next ball of a row of them, which do not touch.
+/// The next ball of a row of balls that do not touch.
 fn dig(terrain: Single<Entity, With<Terrain>>, mut work: ResMut<Work>, mut stamps: MessageWriter<Stamp>) {
     let column = work.stamps % 5;
     let row = work.stamps / 5 % 5;
@@ -39,7 +39,7 @@ fn app_with_time(step: f64) -> (App, Entity) {
     (app, terrain)
 }
 
-/// What one of the balls removes.
+/// The cubic voxels that one of the balls removes.
 fn one_ball() -> u64 {
     let (mut app, _) = app_with_time(1.0);
     app.add_systems(Update, dig.run_if(|work: Res<Work>| work.stamps == 0)).add_systems(Update, count);

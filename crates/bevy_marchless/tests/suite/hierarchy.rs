@@ -1,4 +1,4 @@
-//! Terrains below other entities: they move with them, change parents, and go with them.
+//! Terrains below other entities move with them, change parents, and are despawned with them.
 
 use crate::common::*;
 use bevy_camera::visibility::Visibility;

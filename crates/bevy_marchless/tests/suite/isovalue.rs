@@ -1,4 +1,4 @@
-//! Brushes, reports and questions mean the surface that is drawn, at any isovalue.
+//! Brushes, reports and queries use the surface that is drawn, at any isovalue.
 
 use crate::common::*;
 use bevy_app::App;
@@ -7,7 +7,7 @@ use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
 use bevy_math::{DVec3, Vec3};
 
-/// Flat ground whose surface is drawn this high.
+/// The height at which the surface of the flat ground is drawn.
 const HEIGHT: f64 = 14.5;
 const ISOVALUES: [f32; 4] = [0.0, 2.0, -2.25, 0.7];
 
@@ -22,7 +22,7 @@ fn apply(app: &mut App, stamp: Stamp) -> Vec<TerrainEdited> {
     app.world().resource::<Messages<TerrainEdited>>().iter_current_update_messages().cloned().collect()
 }
 
-/// The points of a ball that are solid and drawn: those above the lowest plane and below the surface.
+/// The points of a ball that are solid and drawn: above the lowest plane and below the surface.
 fn points_in_ball(center: DVec3, radius: f64) -> u64 {
     let points = marchless::Region::new([1; 3], [32; 3]).points().map(|point| DVec3::from(point.map(f64::from)));
     points.filter(|point| point.y < HEIGHT && point.distance(center) < radius).count() as u64

@@ -1,6 +1,6 @@
-//! The plugin, from outside: one binary, since each that links Bevy takes seconds and a hundred megabytes.
+//! Tests of the plugin's public API, in one binary: each binary that links Bevy takes seconds and a hundred megabytes.
 //!
-//! A process has one log, so the tests that read it are binaries of their own.
+//! A process has one log, so tests that read it are separate binaries.
 
 mod common;
 

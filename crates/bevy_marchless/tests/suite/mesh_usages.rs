@@ -11,7 +11,7 @@ use bevy_mesh::{Mesh, Mesh3d};
 
 const BOTH: RenderAssetUsages = RenderAssetUsages::RENDER_WORLD.union(RenderAssetUsages::MAIN_WORLD);
 
-/// Where the assets of all meshes are kept, by how many there are of each.
+/// The usages of all mesh assets, with the number of assets for each.
 fn counts(app: &mut App) -> [usize; 2] {
     let mut meshes = app.world_mut().query::<&Mesh3d>();
     let assets = app.world().resource::<Assets<Mesh>>();

@@ -1,4 +1,4 @@
-//! Observers tell when chunks come, when they look different, and when they go.
+//! Observers run when chunks are spawned, when their mesh changes, and when they are despawned.
 
 use crate::common::*;
 use bevy_app::App;
@@ -9,7 +9,7 @@ use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 
-/// How many chunks have come, how often they have got geometry, and how many have gone.
+/// The number of chunks spawned, of geometries inserted, and of chunks despawned.
 #[derive(Resource, Default, Clone, Copy, Debug, PartialEq)]
 struct Seen {
     come: usize,

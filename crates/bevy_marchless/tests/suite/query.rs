@@ -1,4 +1,4 @@
-//! Queries hit what is drawn.
+//! Queries hit the meshes that are drawn.
 
 use crate::common::*;
 use bevy_app::App;
@@ -17,7 +17,7 @@ fn a_ray_hits_a_moved_turned_and_scaled_terrain() {
     let terrain = app.world_mut().spawn((small(Terrain::new(source)).with_voxel_size(0.5), transform)).id();
     settle(&mut app, terrain);
     app.update();
-    // The ball's radius: 12 voxels of 0.5, twice as large.
+    // The ball's radius: 12 voxels of 0.5 units, scaled by 2.
     let middle = transform.transform_point(Vec3::splat(8.0));
     for direction in [Vec3::X, Vec3::NEG_Y, Vec3::new(1.0, 2.0, -3.0).normalize()] {
         let origin = middle + direction * 50.0;
@@ -105,7 +105,7 @@ fn a_weight_beside_a_chunk_that_is_not_filled_is_unknown() {
     let first = grid.bounds().unwrap().points().find(|position| grid.chunk(*position).is_some()).unwrap();
     let corner = Vec3::from(first.map(|v| v as f32)) * 16.0;
     assert_eq!(first[0], 0, "it has a neighbour along x");
-    // In its midst, and half a voxel before that neighbour.
+    // Inside that neighbour, and half a voxel before it.
     let (within, beside) = (corner + 1.5, corner + Vec3::new(15.5, 1.5, 1.5));
     let weights = app.world_mut().run_system_once(move |terrains: TerrainQuery| {
         [within, beside].map(|position| terrains.weight_at(terrain, position))

@@ -9,13 +9,13 @@ use bevy_marchless::prelude::*;
 use bevy_math::{Dir3, Ray3d, Vec3};
 use bevy_transform::components::Transform;
 
-/// Which terrain a ray along z hits after an update.
+/// The terrain that a ray along z hits after an update.
 fn hit(app: &mut App) -> Option<Entity> {
     app.update();
     cast(app, Vec3::new(16.0, 16.0, 100.0), Vec3::splat(16.0), 1000.0).map(|hit| hit.terrain)
 }
 
-/// Which of the terrains for which `filter` is true.
+/// The first terrain that a ray hits among those for which `filter` is true.
 fn hit_where(app: &mut App, filter: impl Fn(&TerrainQuery, Entity) -> bool + Send + Sync + 'static) -> Option<Entity> {
     let ray = Ray3d::new(Vec3::new(16.0, 16.0, 100.0), Dir3::NEG_Z);
     let query = move |terrains: TerrainQuery| {
@@ -39,7 +39,7 @@ fn near_and_far(app: &mut App) -> [Entity; 2] {
 
 #[test]
 fn a_hidden_terrain_is_passed() {
-    // None of Bevy's plugins works out what visibility is inherited.
+    // No Bevy plugin computes inherited visibility in this app.
     let mut app = bare_app();
     let [near, far] = near_and_far(&mut app);
     assert_eq!(hit(&mut app), Some(near));
@@ -67,7 +67,7 @@ fn a_terrain_below_a_hidden_one_is_passed_unless_it_is_visible_by_itself() {
     app.world_mut().entity_mut(near).insert(Visibility::Inherited);
     app.world_mut().entity_mut(middle).insert(Visibility::Visible);
     assert_eq!(hit(&mut app), Some(near));
-    // One without visibility hands nothing on, as in Bevy.
+    // A parent without visibility passes none on, as in Bevy.
     app.world_mut().entity_mut(middle).remove::<Visibility>();
     assert_eq!(hit(&mut app), Some(near));
     app.world_mut().entity_mut(middle).insert(Visibility::Inherited);

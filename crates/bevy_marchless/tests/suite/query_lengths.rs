@@ -1,4 +1,4 @@
-//! Lengths in world units and in voxels become each other.
+//! Lengths convert between world units and voxels.
 
 use crate::common::*;
 use bevy_app::App;
@@ -8,7 +8,7 @@ use bevy_marchless::prelude::*;
 use bevy_math::{Quat, Vec3};
 use bevy_transform::components::Transform;
 
-/// A length in world units in voxels, and one in voxels in world units.
+/// A length in world units as voxels, and a length in voxels as world units.
 fn lengths(app: &mut App, terrain: Entity, length: f32) -> [Option<f32>; 2] {
     let query = move |terrains: TerrainQuery| {
         [terrains.to_lattice_length(terrain, length), terrains.to_world_length(terrain, length)]

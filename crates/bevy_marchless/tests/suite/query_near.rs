@@ -1,4 +1,4 @@
-//! Terrains that a ray does not come near are passed over, and no hit is lost by it.
+//! Terrains that a ray does not come near are skipped, and no hit is lost.
 
 use std::cell::Cell;
 
@@ -12,7 +12,7 @@ use bevy_transform::components::{GlobalTransform, Transform};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
-/// Shearing, mirrored, flat and huge ones among them.
+/// Random transforms, including shearing, mirrored, flat and huge ones.
 fn place() -> impl Strategy<Value = Affine3A> {
     let column = || [-1.5f32..1.5, -1.5f32..1.5, -1.5f32..1.5];
     let scale = prop_oneof![6 => 0.2f32..4.0, 1 => Just(1e-3), 1 => Just(500.0), 1 => Just(-1.0), 1 => Just(0.0)];
@@ -25,7 +25,7 @@ fn place() -> impl Strategy<Value = Affine3A> {
     })
 }
 
-/// The terrain to aim at, where in it in voxels, how far from it, from where, and how long the ray is.
+/// The index of a terrain, a target in it in voxels, the distance from it, the direction, and the ray's length.
 fn aim() -> impl Strategy<Value = (usize, [f32; 3], f32, [f32; 3], f32)> {
     let near = || prop_oneof![3 => 4.0f32..28.0, 1 => -40.0f32..50.0];
     let within = [near(), near(), near()];
@@ -36,7 +36,7 @@ fn aim() -> impl Strategy<Value = (usize, [f32; 3], f32, [f32; 3], f32)> {
     (0..4usize, within, away, towards, length)
 }
 
-/// Balls, the second of them at negative positions, ground, and waves without end.
+/// Four terrains: a ball, a ball at negative positions, ground, and endless waves.
 fn terrains(app: &mut App) -> [Entity; 4] {
     let negative = Terrain::new(|p: [f64; 3]| p.map(|v| (v + 16.0) * (v + 16.0)).iter().sum::<f64>().sqrt() - 12.0)
         .with_extent(Extent::new(IVec3::splat(-2), IVec3::ZERO))

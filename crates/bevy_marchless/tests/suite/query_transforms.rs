@@ -1,4 +1,4 @@
-//! Terrains are where their transforms say, also in apps where nobody propagates transforms.
+//! Terrains are where their transforms say, also in apps that do not propagate transforms.
 
 use crate::common::*;
 use bevy_app::{App, PostUpdate, TaskPoolPlugin};
@@ -91,7 +91,7 @@ fn where_bevy_propagates_the_plugin_writes_nothing() {
     let terrain = app.world_mut().spawn((ball(), moved(1000.0))).id();
     settle(&mut app, terrain);
     assert_at(&mut app, moved(1000.0));
-    // Bevy looks at it again when its transform changes, and not before.
+    // Bevy propagates it again when its transform changes, and not before.
     let elsewhere = GlobalTransform::from(moved(-7.0));
     *app.world_mut().get_mut::<GlobalTransform>(terrain).unwrap() = elsewhere;
     (0..3).for_each(|_| app.update());
@@ -100,7 +100,7 @@ fn where_bevy_propagates_the_plugin_writes_nothing() {
 
 #[test]
 fn where_another_plugin_propagates_this_one_writes_nothing() {
-    /// World space is relative to something at x = 100.
+    /// A propagation whose world space is relative to x = 100.
     fn propagate(mut all: Query<(&Transform, &mut GlobalTransform), Changed<Transform>>) {
         for (transform, mut global) in &mut all {
             *global = (Transform::from_xyz(-100.0, 0.0, 0.0) * *transform).into();
@@ -108,7 +108,7 @@ fn where_another_plugin_propagates_this_one_writes_nothing() {
     }
     let mut app = app_without_propagation();
     app.add_systems(PostUpdate, propagate.in_set(TransformSystems::Propagate));
-    // At the origin of its world space, where the first one is.
+    // At the origin of its world space, at the place of the first one.
     for x in [100.0, 1000.0] {
         let terrain = app.world_mut().spawn((ball(), Transform::from_xyz(x, 0.0, 0.0))).id();
         settle(&mut app, terrain);

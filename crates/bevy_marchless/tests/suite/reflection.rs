@@ -1,4 +1,4 @@
-//! What an inspector does: settings are changed by their names, and terrains and chunks lead to each other.
+//! Reflection as an inspector uses it: settings change by name, and terrains and chunks lead to each other.
 
 use crate::common::*;
 use bevy_ecs::prelude::*;

@@ -4,7 +4,7 @@ use crate::common::*;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 
-/// Stays behind the gate while it samples.
+/// A source that waits behind the gate while it samples.
 fn gated_ground(gate: &Gate) -> Terrain {
     let gate = gate.clone();
     small(Terrain::new(move |[x, y, z]: [f64; 3]| {
@@ -42,7 +42,7 @@ fn an_edit_while_a_chunk_is_being_filled_is_not_lost() {
 
 #[test]
 fn edits_while_a_group_is_being_meshed_show_after_it() {
-    // One job an update, so that a group of eight takes eight updates.
+    // One job per update, so that a group of eight takes eight updates.
     let mut app = app_with_budget(1);
     app.world_mut().resource_mut::<MarchlessSettings>().max_inline_chunks = 0;
     let terrain = settled(&mut app, ground());
@@ -93,7 +93,7 @@ fn samples_of_a_removed_terrain_are_dropped() {
         } else {
             entity.remove::<Terrain>();
         }
-        // The first chunk stops at a gate again, so that the former one comes while the new one is waited for.
+        // The first chunk stops at a gate again, so that its former result arrives while the new one is pending.
         let second = Gate::default();
         entity.insert(gated_ground(&second).with_chunk_cells(8));
         app.update();

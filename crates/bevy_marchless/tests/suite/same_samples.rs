@@ -1,4 +1,4 @@
-//! The same stamps give the same samples, whatever the order in which threads work.
+//! The same stamps give the same samples, in whatever order threads work.
 
 use crate::common::*;
 use bevy_app::App;
@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use bevy_marchless::prelude::*;
 use bevy_math::Vec3;
 
-/// Twelve stamps, one an update from the first on, while the terrain is still being filled.
+/// Twelve stamps, one per update from the first on, while the terrain is still being filled.
 fn play(mut app: App, updates_before: usize) -> (App, Entity) {
     let terrain = app.world_mut().spawn(ground()).id();
     for _ in 0..updates_before {

@@ -1,5 +1,5 @@
-//! The same stamps give the same samples wherever viewers are, also where a source is certain of a chunk as long as nobody
-//! looks closely.
+//! The same stamps give the same samples wherever viewers are, even if only the source's close bound leaves a chunk to
+//! sampling.
 
 use crate::common::stream::Fresh;
 use crate::common::*;
@@ -13,7 +13,8 @@ use std::time::Duration;
 
 const CELLS: u32 = 16;
 
-/// Flat ground, 4.5 voxels below the middle layers of chunks. Its bound is certain of what lies above or below; looking closely, it leaves all to sampling.
+/// Flat ground, 4.5 voxels below the middle layers of chunks. Its bound is certain of regions above and below the
+/// surface; its close bound leaves everything to sampling.
 struct Plain;
 
 const HEIGHT: f64 = -4.5;
@@ -39,7 +40,7 @@ impl Source for Plain {
     }
 }
 
-/// 80 stamps within one chunk: whole ones and strokes of every operation, one in each update where `slowly`.
+/// 80 stamps within one chunk: whole ones and strokes of every operation, one per update if `slowly`.
 fn stamps(terrain: Entity, chunk: IVec3) -> Vec<Stamp> {
     let corner = (chunk * CELLS as i32).as_vec3();
     let stamp = |step: u8| {
@@ -58,7 +59,7 @@ fn stamps(terrain: Entity, chunk: IVec3) -> Vec<Stamp> {
     (0..80).map(stamp).collect()
 }
 
-/// Where the viewer is while the stamps are applied.
+/// The viewer's place while the stamps are applied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Viewer {
     There,
@@ -68,7 +69,7 @@ enum Viewer {
 
 const AWAY: Vec3 = Vec3::new(100_000.0, 0.0, 0.0);
 
-/// Applies the stamps, some an update, and returns the app once the chunk has been loaded for a viewer, if need be again.
+/// Applies the stamps, some per update, and returns the app once the chunk is loaded for a viewer.
 fn play(terrain: &Terrain, chunk: IVec3, stamped: Viewer, an_update: usize, sample_radius: f32) -> (App, Entity) {
     let mut app = app_with_budget(16);
     let terrain = app.world_mut().spawn(terrain.clone()).id();
@@ -95,7 +96,7 @@ fn play(terrain: &Terrain, chunk: IVec3, stamped: Viewer, an_update: usize, samp
     (app, terrain)
 }
 
-/// Asserts that a chunk has the samples that the core alone gives it, whoever looked.
+/// Asserts that a chunk has the samples that the core alone computes, wherever viewers were.
 fn assert_same_samples(terrain: &Terrain, chunk: IVec3) {
     let mut fresh = Fresh::new(terrain);
     for stamp in stamps(Entity::PLACEHOLDER, chunk) {

@@ -1,4 +1,5 @@
-//! Settings change where viewers keep few samples: the terrain settles, and digs go on to show in their update.
+//! Settings change the radius within which viewers keep samples: the terrain settles, and digs still show in their
+//! update.
 
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ use bevy_marchless::stream::LeafState;
 use bevy_math::{IVec3, Vec3};
 use bevy_transform::components::Transform;
 
-/// An endless world, drawn, whose samples are dropped but for those near the origin.
+/// An endless terrain, drawn, whose samples are dropped except near the origin.
 fn far_seeing() -> (App, Entity) {
     let mut app = app_with_budget(16);
     let terrain = app.world_mut().spawn(world()).id();
@@ -30,7 +31,7 @@ fn change(app: &mut App, terrain: Entity, change: impl FnOnce(&mut Terrain)) {
     change(&mut app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain"));
 }
 
-/// Digs near the viewer, and tells whether that showed in its update.
+/// Digs near the viewer, and returns whether that showed in the same update.
 fn dig_shows(app: &mut App, terrain: Entity, at: Vec3) -> (Stamp, bool) {
     let shown = |app: &App| volume(app, terrain).shown().get(at.as_ivec3().to_array());
     assert!(shown(app).weight < 0, "solid at {at}");
@@ -42,7 +43,7 @@ fn dig_shows(app: &mut App, terrain: Entity, at: Vec3) -> (Stamp, bool) {
     (stamp, shows)
 }
 
-/// Asserts that every chunk is drawn as in a world that nobody flew through.
+/// Asserts that every chunk is drawn as on a fresh terrain.
 fn assert_as_fresh(app: &mut App, terrain: Entity, stamps: &[Stamp]) {
     let mut fresh = Fresh::new(app.world().get::<Terrain>(terrain).expect("a terrain"));
     for stamp in stamps {

@@ -19,7 +19,7 @@ use bevy_world_serialization::serde::WorldDeserializer;
 use bevy_world_serialization::{DynamicWorld, DynamicWorldBuilder};
 use serde::de::DeserializeSeed as _;
 
-/// An app whose registry knows what a game's does.
+/// An app with the type registrations of a game.
 fn app() -> App {
     let mut app = crate::common::app();
     app.register_type::<Transform>().register_type::<Visibility>().register_type::<Name>();
@@ -27,7 +27,7 @@ fn app() -> App {
     app
 }
 
-/// Writes entities, with all that can be written of them.
+/// Writes entities with all components that can be written.
 fn write(app: &App, entities: &[Entity]) -> Result<String, ron::Error> {
     let registry = app.world().resource::<AppTypeRegistry>().read();
     let builder = DynamicWorldBuilder::from_world(app.world(), &registry).deny_component::<Mesh3d>();
@@ -86,7 +86,7 @@ fn settings_and_data_sources_come_back() {
             assert!(position == at && mesh == read, "the chunk at {position}");
         }
         assert_drawn(&mut other, copy);
-        // Nothing is left behind when it goes.
+        // Nothing is left behind when the terrain is despawned.
         other.world_mut().despawn(copy);
         other.update();
         assert_eq!(other.world_mut().query::<&Chunk>().iter(other.world()).count(), 0);
@@ -100,7 +100,7 @@ fn a_whole_scene_is_read_without_orphans() {
     let source = NoiseHeights::from_seed(3);
     let terrain = app.world_mut().spawn((small(Terrain::new(source)), ChildOf(parent))).id();
     settle(&mut app, terrain);
-    // Chunks and all, as from a query of all entities.
+    // Chunks included, as from a query of all entities.
     let mut all = app.world_mut().query_filtered::<Entity, With<Transform>>();
     let all: Vec<_> = all.iter(app.world()).collect();
     let drawn = geometry(&mut app, terrain).len();
@@ -137,7 +137,7 @@ fn sources_of_the_games_own_go_by_name() {
     let text = write(&app, &[terrain]).expect("it has a name");
     assert!(text.contains("Named(\"waves\")"), "{text}");
 
-    // Where nobody knows the name: one error, and nothing there.
+    // The name is not registered: one error, and an empty terrain.
     let mut other = self::app();
     let copy = spawn(&mut other, &text)[&terrain];
     (0..5).for_each(|_| other.update());
@@ -145,7 +145,7 @@ fn sources_of_the_games_own_go_by_name() {
     assert_eq!(error, TerrainError::Source { name: "waves".into() });
     assert!(error.to_string().contains("'waves'"));
     assert!(geometry(&mut other, copy).is_empty() && volume(&other, copy).settings().is_none());
-    // As soon as somebody does, it is there; another source of that name replaces it.
+    // As soon as the name is registered, the terrain is there; another source of that name replaces it.
     other.world_mut().resource_mut::<TerrainSources>().insert("waves", waves);
     settle(&mut other, copy);
     assert!(other.world().get::<TerrainError>(copy).is_none());
@@ -157,7 +157,7 @@ fn sources_of_the_games_own_go_by_name() {
     assert_ne!(geometry(&mut other, copy), before);
     assert_drawn(&mut other, copy);
 
-    // Without a name a closure cannot be written, and the error says what to do.
+    // A closure without a name cannot be written, and the error says what to do.
     let nameless = settled(&mut app, ground());
     let error = write(&app, &[nameless]).expect_err("a closure").to_string();
     assert!(error.contains("SourceHandle::named"), "{error}");

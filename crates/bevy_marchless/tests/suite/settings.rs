@@ -1,4 +1,4 @@
-//! Bad settings are refused in a sentence; changed settings take effect.
+//! Bad settings are refused with a sentence; changed settings take effect.
 
 use crate::common::*;
 use bevy_marchless::prelude::*;

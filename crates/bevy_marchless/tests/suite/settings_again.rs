@@ -1,4 +1,4 @@
-//! Settings that change again before their change is drawn: the terrain settles, and the newest settings come last.
+//! Settings change again before their change is drawn: the terrain settles with the newest settings.
 
 use std::time::Duration;
 
@@ -10,13 +10,13 @@ use bevy_marchless::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use proptest::prelude::*;
 
-/// Waves of 8 × 2 × 8 chunks, about as high as the middle between both layers of chunks.
+/// Waves of 8 × 2 × 8 chunks, about as high as the border between both layers of chunks.
 fn waves(height: f64) -> Terrain {
     let source = move |[x, y, z]: [f64; 3]| y - height - 2.0 * (x * 0.2).sin() * (z * 0.15).cos();
     Terrain::new(source).with_extent(UVec3::new(8, 2, 8)).with_chunk_cells(8)
 }
 
-/// Another colour for all, a different one for each number.
+/// A palette of one colour, different for each number.
 fn palette(number: u32) -> Palette {
     Palette::new([Color::srgb(0.25, 0.5, 1.0 / (2.0 + number as f32))])
 }
@@ -25,7 +25,7 @@ fn change(app: &mut App, terrain: Entity, change: impl FnOnce(&mut Terrain)) {
     change(&mut app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain"));
 }
 
-/// Without threads, and with hardly any time for the main thread: each update does little, and always the same.
+/// An app without threads and with hardly any main-thread budget: each update does little, and always the same.
 fn slow_app() -> App {
     let mut app = app_with_budget(8);
     app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::ZERO;
@@ -90,7 +90,7 @@ fn heights(app: &mut App, terrain: Entity) -> Vec<(IVec3, f32)> {
 
 #[test]
 fn what_a_slider_asks_for_shows_while_it_is_dragged() {
-    // The highest vertex of each chunk tells which plane it shows.
+    // The highest vertex of each chunk shows which plane it was meshed from.
     let plane = |step: u32| move |[_, y, _]: [f64; 3]| y - (3.0 + 0.03 * f64::from(step));
     for every in [1, 2, 5] {
         let mut app = app_with_budget(4);
@@ -150,7 +150,7 @@ enum Change {
     Isovalue(f32),
     Normals(bool),
     Extent(UVec3),
-    /// The others fill the terrain anew, and give a voxel size that it has not had yet.
+    /// The others fill the terrain again, with a voxel size that it has not had yet.
     VoxelSize,
     Cells(u32),
     Source(f64),
@@ -171,7 +171,7 @@ fn changes() -> impl Strategy<Value = Change> {
         1 => (8u32..12).prop_map(Change::Cells),
         1 => (side(), side()).prop_map(|(x, z)| Change::Extent(UVec3::new(x, 2, z))),
         2 => (5.0..12.0).prop_map(Change::Source),
-        // All reach the first chunk, and some reach over the border of the extent.
+        // All stamps touch the first chunk, and some cross the border of the extent.
         4 => (0.0f32..9.0, 5.0f32..12.0, 0.0f32..9.0, 1.0f32..9.0, any::<bool>())
             .prop_map(|(x, y, z, radius, digs)| Change::Stamp { at: Vec3::new(x, y, z), radius, digs }),
     ]

@@ -1,5 +1,5 @@
-//! Settings that only change how samples look do not hold up digs: colours and normals sweep over the chunks, an isovalue
-//! is shown at once when all is meshed for it.
+//! Settings that only change how samples look do not delay digs: colours and normals sweep over the chunks, an isovalue
+//! is shown in one update when all chunks are meshed for it.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use bevy_marchless::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use marchless::MeshBuffer;
 
-/// Waves of 6 × 2 × 6 chunks, about as high as the middle between both layers of chunks.
+/// Waves of 6 × 2 × 6 chunks, about as high as the border between both layers of chunks.
 fn waves() -> Terrain {
     let source = |[x, y, z]: [f64; 3]| y - 16.3 - 2.0 * (x * 0.2).sin() * (z * 0.15).cos();
     Terrain::new(source).with_extent(UVec3::new(6, 2, 6)).with_chunk_cells(16)
@@ -30,10 +30,10 @@ fn dig(terrain: Entity, x: f32, z: f32) -> Stamp {
     Stamp::dig(terrain, BrushShape::sphere(Vec3::new(x, 16.0, z), 2.5))
 }
 
-/// Where digs are made: at corners of chunks, far from each other and near.
+/// The places of digs: at corners of chunks, far apart and close together.
 const PLACES: [(f32, f32); 3] = [(16.0, 16.0), (48.0, 32.0), (48.0, 36.0)];
 
-/// What the newest samples ask for at an isovalue; without normals.
+/// The meshes of the newest samples at an isovalue, without normals.
 fn surface(app: &App, terrain: Entity, isovalue: f32) -> Vec<(IVec3, MeshBuffer)> {
     let grid = volume(app, terrain).grid();
     let settings = marchless::MeshSettings { isovalue, normals: false, ..Default::default() };
@@ -46,7 +46,7 @@ fn surface(app: &App, terrain: Entity, isovalue: f32) -> Vec<(IVec3, MeshBuffer)
     grid.bounds().expect("bounded").points().map(mesh).filter(|(_, mesh)| !mesh.is_empty()).collect()
 }
 
-/// What is drawn, without normals.
+/// The drawn meshes, without normals.
 fn drawn(app: &mut App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)> {
     let without_normals = |mesh: &MeshBuffer| MeshBuffer { normals: Vec::new(), ..mesh.clone() };
     let mut drawn = geometry(app, terrain);
@@ -54,7 +54,7 @@ fn drawn(app: &mut App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)> {
     drawn.into_iter().map(|(position, mesh)| (position, without_normals(&mesh))).collect()
 }
 
-/// Asserts that what is drawn has the newest samples and this isovalue, whatever its colours and normals.
+/// Asserts that the drawn meshes are those of the newest samples at this isovalue, with any colours and normals.
 fn assert_surface(app: &mut App, terrain: Entity, isovalue: f32) {
     let (mut expected, mut drawn) = (surface(app, terrain, isovalue), drawn(app, terrain));
     expected.sort_by_key(|(position, _)| position.to_array());

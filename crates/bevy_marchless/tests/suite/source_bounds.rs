@@ -1,4 +1,4 @@
-//! What all sources promise: a bound that is true, and samples that depend on nothing but their position.
+//! The guarantees of all sources: bounds are true, and samples depend only on their position.
 
 use bevy_marchless::source::{
     Air, Bound, Fractal, HeightMap, HeightMapSettings, NoiseDensity, NoiseDensitySettings, NoiseHeights,
@@ -93,7 +93,7 @@ fn shape() -> impl Strategy<Value = Sdf> {
     })
 }
 
-/// A bound, where there is one, says what sampling says; points sampled alone are as in the whole region.
+/// A certain bound agrees with sampling, and points sampled alone equal those of the whole region.
 fn check(source: &dyn Source, region: &SourceRegion) -> Result<(), TestCaseError> {
     let (distances, materials) = filled(source, region);
     match source.bound(region) {
@@ -191,7 +191,7 @@ fn far_regions_are_skipped() {
     assert!(filled(&Air, &at(0)).0.iter().all(|d| *d > 0.0));
 }
 
-/// The nearest point of the hills' surface, found by brute force, is about as far as the samples say.
+/// The distance to the nearest point of the hills' surface, found by brute force, is about that of the samples.
 #[test]
 fn distances_to_hills_are_nearly_true() {
     let noise = Fractal { zoom: 50.0, octaves: 4, ..Fractal::default() };
@@ -217,7 +217,7 @@ fn distances_to_hills_are_nearly_true() {
     assert!(checked > 20, "only {checked} points lie near the surface");
 }
 
-/// Along the vertical through a cave's wall, distances grow by about one voxel a voxel times the wall's tilt.
+/// Along the vertical through a cave's wall, distances grow by about one voxel per voxel times the wall's tilt.
 #[test]
 fn distances_to_caves_have_gradients_of_about_one() {
     let caves = NoiseDensity::default();
@@ -252,7 +252,7 @@ fn another_seed_is_another_world_and_the_same_seed_the_same() {
     assert_ne!(hills(1), hills(2));
 }
 
-/// Noise goes on far away, where its lattice no longer fits into an integer.
+/// Noise works far away, where an integer cannot hold positions of its lattice.
 #[test]
 fn noise_goes_on_far_away() {
     let noise = Fractal { octaves: 16, zoom: 1e-9, lacunarity: 8.0, ..Fractal::default() };

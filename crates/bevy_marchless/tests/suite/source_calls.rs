@@ -1,25 +1,25 @@
-//! How often noise is evaluated for all chunks around a viewer, and how many of them are sampled in vain.
+//! Counts of noise evaluations for all chunks around a viewer, and of chunks sampled without a surface.
 
 use std::sync::Arc;
 use std::thread;
 
 use bevy_marchless::source::{Bound, Caves, Landscape, LandscapeSettings, NoiseHeights, Solid, Source, SourceRegion};
 
-/// Samples along a chunk.
+/// The number of samples along a chunk.
 const CELLS: i32 = 32;
 
-/// What streaming asks of a source.
+/// The requests that streaming makes of a source.
 #[derive(Debug, Default)]
 struct Asked {
     chunks: u64,
     filled: u64,
-    /// Of those that were filled, without a surface.
+    /// The filled chunks without a surface.
     empty: u64,
     calls: u64,
 }
 
 /// Loads all chunks of a ball of 8 chunks around a viewer near the ground: bound, closer bound, samples. `checked`: the
-/// same source, to look for surfaces without being counted.
+/// same source, to find surfaces without counting the evaluations.
 fn load(source: &dyn Source, checked: &dyn Source, calls: impl Fn() -> u64) -> Asked {
     let mut asked = Asked::default();
     let middle = [16, 70, 16];
@@ -53,7 +53,7 @@ fn load(source: &dyn Source, checked: &dyn Source, calls: impl Fn() -> u64) -> A
     asked
 }
 
-/// Columns of a chunk, and its samples.
+/// The columns of a chunk, and its samples.
 const COLUMNS: u64 = (CELLS * CELLS) as u64;
 const SAMPLES: u64 = COLUMNS * CELLS as u64;
 
@@ -97,7 +97,7 @@ fn a_column_that_was_evaluated_costs_no_noise_above_and_below() {
     assert!(hills.noise_calls() > calls, "columns of another spacing are others");
 }
 
-/// Threads that ask for the same columns at once evaluate them once, and all get the same.
+/// Threads that need the same columns at the same time evaluate them once, and all get the same heights.
 #[test]
 fn threads_share_columns() {
     let hills = Arc::new(NoiseHeights::default());
@@ -119,7 +119,7 @@ fn threads_share_columns() {
     assert_eq!(hills.noise_calls(), alone.noise_calls());
 }
 
-/// Long flights do not keep all columns; what was dropped is evaluated again, to the same heights.
+/// Long flights do not keep all columns; dropped ones are evaluated again, to the same heights.
 #[test]
 fn columns_are_dropped_and_come_back() {
     let hills = NoiseHeights::default();

@@ -1,4 +1,4 @@
-//! Height maps: what a picture's samples become, and one clear sentence for each that is none.
+//! Height maps: samples become ground, and every bad picture gives one clear sentence.
 
 use bevy_marchless::source::{HeightMap, HeightMapError, HeightMapSettings, SourceError};
 use bevy_math::{DVec2, UVec3};
@@ -48,7 +48,7 @@ fn a_plane_stays_a_plane() {
         let found = map.height((x + 0.5) * 4.0, (z + 0.5) * 8.0);
         assert!((found - expected).abs() < 1e-9, "{found} is not {expected} at {x}, {z}");
     }
-    // Beyond the border its heights go on.
+    // Beyond the border its heights continue.
     assert_eq!(map.height(-1e12, -1e12), 5.0);
     assert_eq!(map.height(1e12, f64::MAX), 5.0 + 0.2 * 2700.0);
 }

@@ -1,4 +1,5 @@
-//! Composed landscapes: true bounds, the same samples whoever asks, settings that are refused, and what a feature does.
+//! Composed landscapes: true bounds, samples that depend only on position, refused settings, and the effects of
+//! features.
 
 use bevy_marchless::source::{
     Bound, Caves, Fractal, Landscape, LandscapeSettings, Layer, MaterialRule, NoiseHeights, Sdf, Solid, Source,
@@ -7,7 +8,7 @@ use bevy_marchless::source::{
 use bevy_math::DVec3;
 use proptest::prelude::*;
 
-/// Samples this far from a surface may be left out.
+/// The margin of close bounds, in voxels.
 const CLOSE: f32 = 3.0;
 
 fn filled(source: &dyn Source, region: &SourceRegion) -> (Vec<f32>, Vec<u8>) {
@@ -110,7 +111,7 @@ fn region() -> impl Strategy<Value = SourceRegion> {
     )
 }
 
-/// A bound says what sampling says, and a close one says it with room for isovalues of ±3.
+/// A certain bound agrees with sampling, and a close one with a margin for isovalues of ±3.
 fn check_bounds(source: &Landscape, region: &SourceRegion) -> Result<(), TestCaseError> {
     let (distances, materials) = filled(source, region);
     prop_assert!(distances.iter().all(|distance| !distance.is_nan()));
@@ -149,7 +150,7 @@ proptest! {
         let from: [u32; 3] = core::array::from_fn(|axis| from[axis] % region.size[axis]);
         let size: [u32; 3] = core::array::from_fn(|axis| size[axis].min(region.size[axis] - from[axis]));
         let min = core::array::from_fn(|axis| region.min[axis] + from[axis] as i32);
-        // Another landscape of the same settings, which has evaluated nothing yet.
+        // Another landscape with the same settings, which has evaluated nothing yet.
         let other = Landscape::new(settings).expect("in range");
         let part = SourceRegion { min, size, ..region };
         let (part_distances, part_materials) = filled(&other, &part);
@@ -181,7 +182,7 @@ fn bounds_are_close() {
     assert_eq!(source.bound(&at([0, -90, 0], 40)), Bound::Inside { material: 2 });
     assert_eq!(source.bound(&at([0, -160, 0], 40)), Bound::Mixed);
     assert_eq!(source.bound(&at([0, -220, 0], 40)), Bound::Outside);
-    // The ground below a column is known when the column is.
+    // The ground below a column is known as soon as the column is.
     let hills = landscape(Solid::default());
     let height = hills.height(16.0, 16.0).expect("there is ground") as i32;
     assert_eq!(hills.bound(&at([12, height + 8, 12], 8)), Bound::Mixed);
@@ -217,7 +218,7 @@ fn layers_do_what_they_say() {
     assert_eq!(height(noise.clone().warped(warp, 0.0)), height(noise));
 }
 
-/// What two kinds of caves leave of a block of rock is neither all of it nor nothing, and a lattice changes it a little.
+/// Two kinds of caves leave a part of a block of rock, and a lattice changes this part a little.
 #[test]
 fn caves_are_hollow_and_a_lattice_changes_them_little() {
     let solid_share = |solid: Solid| {
@@ -303,7 +304,7 @@ fn settings_out_of_range_are_named() {
     assert!(Landscape::new(LandscapeSettings { materials: vec![rule], ..Default::default() }).is_err());
 }
 
-/// Extreme settings that are allowed, and positions at the ends of the lattice, give numbers.
+/// Extreme settings that are allowed, and positions at the ends of the lattice, never give NaN.
 #[test]
 fn the_ends_of_the_world_are_sampled() {
     let noise = Fractal { octaves: 16, zoom: 1e-9, lacunarity: 8.0, ..Fractal::default() };

@@ -25,7 +25,7 @@ fn what_a_viewer_sees_is_loaded_and_goes_when_it_leaves() {
     settle(&mut app, terrain);
     assert!(geometry(&mut app, terrain) == here, "as before");
     assert_eq!(volume(&app, terrain).coverage(), first);
-    app.update(); // Assets that nobody holds any more go an update later.
+    app.update(); // Unused assets are dropped one update later.
     assert_eq!(app.world_mut().query::<&bevy_mesh::Mesh3d>().iter(app.world()).count(), mesh_assets(&app));
     app.world_mut().despawn(viewer);
     settle(&mut app, terrain);
@@ -48,7 +48,7 @@ fn holes_are_there_when_one_comes_back() {
     let dug = geometry(&mut app, terrain);
     move_to(&mut app, viewer, Vec3::new(0.0, 0.0, -3_000.0));
     settle(&mut app, terrain);
-    // A second hole, where nothing is loaded any more.
+    // A second hole, in unloaded terrain.
     app.world_mut().write_message(Stamp::dig(terrain, BrushShape::sphere(Vec3::new(-9.0, -3.0, 9.0), 3.0)));
     app.update();
     move_to(&mut app, viewer, Vec3::ZERO);

@@ -1,4 +1,4 @@
-//! Nothing that a game does wrong stops it, and nothing that was loaded is lost by it.
+//! A game's mistakes do not stop it, and lose nothing that was loaded.
 
 use std::time::Duration;
 
@@ -30,7 +30,7 @@ fn settled_flight() -> Flight {
     flight
 }
 
-/// Makes a change, sees that what is drawn stays for some updates, undoes it, and sees that all goes on.
+/// Makes a change, checks that drawn chunks stay for some updates, undoes it, and checks that streaming continues.
 fn nothing_is_lost_while<C: Component<Mutability = bevy_ecs::component::Mutable> + Clone>(
     flight: &mut Flight,
     entity: Entity,
@@ -46,7 +46,7 @@ fn nothing_is_lost_while<C: Component<Mutability = bevy_ecs::component::Mutable>
     }
     assert_eq!(flight.drawn(), before, "{name}");
     assert_eq!(volume(&flight.app, flight.terrain).coverage(), leaves, "{name}");
-    // An edit there works all the same.
+    // An edit there still works.
     let terrain = flight.terrain;
     flight.stamp(Stamp::dig(terrain, BrushShape::sphere(Vec3::new(4.0, Hills::height(4.0, 4.0) as f32, 4.0), 3.0)));
     flight.app.update();
@@ -74,7 +74,7 @@ fn viewers_without_a_place() {
     }
 }
 
-/// Where it looks only matters for what comes first.
+/// The view direction only affects the order of loading.
 #[test]
 fn viewers_that_look_nowhere() {
     for bad in [
@@ -161,7 +161,7 @@ fn terrains_without_a_place() {
     }
 }
 
-/// Where a source panics.
+/// The function in which a source panics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Panics {
     Fill,
@@ -213,7 +213,7 @@ fn sources_that_panic_leave_out_a_chunk() {
             let view = View::all(&mut app, terrain)[0];
             let left_out = IVec3::from(Bad::POINT).div_euclid(IVec3::splat(8));
             for position in view.chunks(8, 0.0).into_iter().map(IVec3::from) {
-                // Those beside it see air there, and bounds are asked for some points more.
+                // Chunks beside it see air there, and bounds cover some points more.
                 if (position - left_out).abs().max_element() <= 2 {
                     continue;
                 }
@@ -230,7 +230,7 @@ fn sources_that_panic_leave_out_a_chunk() {
             }
             let leaf = volume(&app, terrain).leaf_at(left_out).expect("it is in range");
             assert_ne!(leaf.state, LeafState::Waiting, "{when:?}");
-            // The game goes on: there too.
+            // The game continues, and this chunk can be edited.
             let shape = BrushShape::sphere(Vec3::from(Bad::POINT.map(|v| v as f32)), 3.0);
             app.world_mut().write_message(Stamp::add(terrain, shape, 1));
             settle(&mut app, terrain);
@@ -244,7 +244,7 @@ fn sources_that_panic_leave_out_a_chunk() {
     }
 }
 
-/// So many updates of a flight that has just begun.
+/// Some updates of a flight that has just begun.
 fn flight_under_way(updates: u32) -> Flight {
     let mut flight = Flight::new(patient_app(), hills(), Transform::IDENTITY);
     let viewer = flight.viewers[0];
@@ -272,7 +272,7 @@ fn terrains_and_viewers_despawned_in_flight() {
             let mut chunks = flight.app.world_mut().query::<&Chunk>();
             assert_eq!(chunks.iter(flight.app.world()).count(), 0, "after {updates} updates");
             assert_eq!(mesh_assets(&flight.app), 0);
-            // The next one comes to life as if nothing had been.
+            // The next terrain loads as usual.
             if terrain {
                 let terrain = flight.app.world_mut().spawn(hills()).id();
                 flight.app.world_mut().spawn(TerrainViewer::new(12.0));
@@ -283,7 +283,7 @@ fn terrains_and_viewers_despawned_in_flight() {
     }
 }
 
-/// Changes a terrain's settings under way, and compares with a fresh world of the new settings.
+/// Changes a terrain's settings on the way, and compares with a fresh terrain of the new settings.
 fn changed_in_flight(change: impl Fn(&mut Terrain)) {
     for updates in [0, 1, 4, 40] {
         let mut flight = flight_under_way(updates);
@@ -291,7 +291,7 @@ fn changed_in_flight(change: impl Fn(&mut Terrain)) {
         change(&mut flight.app.world_mut().get_mut::<Terrain>(terrain).unwrap());
         let settings = flight.app.world().get::<Terrain>(terrain).unwrap().clone();
         flight.fresh = Fresh::new(&settings);
-        // What was drawn may go at once, or stay until the new mesh is there.
+        // The drawn chunks may go at once, or stay until the new meshes are there.
         for _ in 0..2_000 {
             flight.app.update();
             if volume(&flight.app, terrain).is_settled() {
@@ -349,7 +349,7 @@ fn refused_settings_in_flight_leave_what_was() {
     assert!(flight.app.world().get::<TerrainError>(terrain).is_none());
 }
 
-/// Where lattice positions end, the world does too.
+/// A terrain ends where lattice positions end.
 #[test]
 fn viewers_at_the_end_of_the_lattice() {
     let end = 2.0f32.powi(31);
@@ -377,7 +377,7 @@ fn viewers_at_the_end_of_the_lattice() {
     }
 }
 
-/// Each viewer loads of each terrain what is near.
+/// Each viewer loads the nearby chunks of each terrain.
 #[test]
 fn many_terrains_and_viewers() {
     let mut app = patient_app();

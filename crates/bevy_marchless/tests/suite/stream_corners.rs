@@ -1,4 +1,4 @@
-//! Streaming where things come together: samples dropped, jobs late, chunks that come back while their edit is meshed.
+//! Corner cases of streaming: dropped samples, late jobs, and chunks that come back while their edit is meshed.
 
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ fn dropped(app: &mut App, terrain: Entity) {
     }
 }
 
-/// Every drawn-or-should-be-drawn leaf whose neighbourhood is in the grid equals a fresh mesh.
+/// The chunks that are not drawn as a fresh mesh of their neighbourhood, as far as the grid holds it.
 fn wrong(app: &mut App, terrain: Entity, around: IVec3, reach: i32) -> Vec<IVec3> {
     let drawn = geometry(app, terrain);
     let volume = volume(app, terrain);
@@ -51,7 +51,7 @@ fn a_chunk_whose_samples_were_dropped_is_drawn_when_it_comes_back() {
     let viewer = app.world_mut().spawn((viewer, Transform::default())).id();
     dropped(&mut app, terrain);
     assert_eq!(volume(&app, terrain).coverage().waiting, 0);
-    // Away, so that dropped chunks are hidden, and back in steps: they come into range at its rim.
+    // Moves away, so that dropped chunks are hidden, and back in steps: the chunks come into range at its rim.
     move_to(&mut app, viewer, Vec3::new(16.0, 0.0, 0.0));
     dropped(&mut app, terrain);
     for x in (0..16).rev() {
@@ -181,7 +181,7 @@ fn flat_worlds_drop_samples_too() {
     assert!(far > 0);
 }
 
-/// Some neighbours of a drawn chunk are unloaded already when its viewer comes back, but not so near that they are asked for.
+/// Some neighbours of a drawn chunk are unloaded when its viewer comes back, but not near enough to be requested.
 #[test]
 fn edits_show_beside_neighbours_that_went() {
     for away in 1..24 {

@@ -1,5 +1,5 @@
-//! How much work a flight over the default hills is, in counts: what is loaded, sampled and meshed, and how many updates
-//! a view takes. Without threads these are the same on every machine.
+//! The work of a flight over the default hills, in counts: chunks loaded, sampled and meshed, and the updates that a
+//! view takes. Without threads, these counts are the same on every machine.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -14,12 +14,12 @@ use bevy_marchless::stats::TerrainStats;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 
-/// Jobs an update.
+/// Jobs per update.
 const BUDGET: usize = 16;
-/// Voxels, 4 chunks.
+/// The viewer's radius: 4 chunks. [Units: voxels]
 const RADIUS: f32 = 128.0;
 
-/// Hills without end, and a viewer above them.
+/// Endless hills, and a viewer above them.
 fn hills() -> (App, Entity, Entity) {
     let mut app = app_with_budget(BUDGET);
     app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
@@ -32,7 +32,7 @@ fn stats(app: &App) -> TerrainStats {
     *app.world().resource::<TerrainStats>()
 }
 
-/// How many updates it takes until everything is drawn.
+/// The number of updates until everything is drawn.
 fn updates_until_settled(app: &mut App, terrain: Entity) -> u64 {
     for update in 1..5_000 {
         app.update();
@@ -89,18 +89,18 @@ fn a_flight_loads_what_comes_into_range_and_little_more() {
     println!(
         "{come} came into range: {loaded} loaded, {bounded} by bound, {filled} sampled, {empty} of them empty, {meshed} meshed"
     );
-    // The chunks around those in range are loaded too: a shell.
+    // The chunks around those in range are loaded, too: a shell.
     assert!(loaded >= come && loaded <= 2 * come, "{loaded} loaded, {come} came into range");
     // The others were settled by a close bound, in a job.
     assert!(bounded + filled <= loaded && bounded > filled, "{bounded} by bound, {filled} sampled");
     assert!(meshed <= come + come / 4, "{meshed} meshed, {come} came into range");
     let (sampled, without_surface) = sampled_chunks(volume(&app, terrain));
     println!("of {sampled} chunks with samples {without_surface} have no surface in them or beside them");
-    // Of the chunks beside the surface, those within the four voxels that stamps and isovalues reach are sampled in vain.
+    // Chunks beside the surface are sampled in vain within four voxels of it, which stamps and isovalues reach.
     assert!(without_surface * 100 <= sampled * 18, "{without_surface} of {sampled} sampled chunks are empty");
 }
 
-/// How many chunks have been sampled, and for how many of them that was in vain: all that their meshes read lies on one side.
+/// The number of sampled chunks, and of those sampled in vain: all samples that their meshes read are on one side.
 fn sampled_chunks(volume: &TerrainVolume) -> (usize, usize) {
     let grid = volume.grid();
     let is_sampled = |chunk: &marchless::GridChunk<i16>| matches!(chunk, marchless::GridChunk::Samples(_));

@@ -1,4 +1,4 @@
-//! In every update of a flight the cover is whole, and what is drawn in the end is what a fresh world draws.
+//! The cover is whole in every update of a flight, and in the end the drawn chunks equal those of a fresh terrain.
 
 use std::time::Duration;
 
@@ -12,19 +12,19 @@ use bevy_math::{IVec3, Quat, Vec3};
 use bevy_transform::components::Transform;
 use proptest::prelude::*;
 
-/// Hills without end, in chunks of 8 cells.
+/// Endless hills, in chunks of 8 cells.
 fn hills() -> Terrain {
     Terrain::endless(Hills::default()).with_chunk_cells(8)
 }
 
-/// An app that works on the main thread alone, so many jobs an update, and takes the time it needs to load and unload.
+/// An app without threads, with a fixed number of jobs per update, and as much time as it needs to load and unload.
 fn patient_app(budget: usize) -> App {
     let mut app = app_with_budget(budget);
     app.world_mut().resource_mut::<MarchlessSettings>().streaming_budget = Duration::from_secs(5);
     app
 }
 
-/// Flies all legs, and compares what is drawn in the end.
+/// Flies all legs, and compares the drawn chunks in the end.
 fn fly(mut flight: Flight, legs: impl IntoIterator<Item = Leg>) -> Flight {
     for leg in legs {
         flight.fly(&leg);
@@ -50,7 +50,7 @@ proptest! {
         fly(flight, legs);
     }
 
-    /// A new app that is told the same edits first draws the same.
+    /// A new app that gets the same edits first draws the same.
     #[test]
     fn a_new_app_with_the_same_edits_draws_the_same(legs in legs(8..24)) {
         let mut flown = fly(Flight::new(patient_app(16), hills(), Transform::IDENTITY), legs);
@@ -73,7 +73,7 @@ proptest! {
     }
 }
 
-/// What these tests fly through says only what is true of a box.
+/// The bounds of the hills that these tests use are true.
 #[test]
 fn the_bounds_of_the_hills_are_true() {
     let (hills, mut certain) = (Hills::default(), [0; 2]);
@@ -114,7 +114,7 @@ fn the_cover_is_whole_while_threads_work() {
     }
 }
 
-/// However little time there is, each update does some of the work, and what comes into range is in the cover at once.
+/// With any time budget, each update does some work, and chunks that come into range are in the cover at once.
 #[test]
 fn the_cover_is_whole_with_hardly_any_time() {
     for seed in 4..=5 {
@@ -136,7 +136,7 @@ fn few_chunks_in_flight_and_few_bytes_an_update_only_take_longer() {
     fly(Flight::new(app, hills(), Transform::IDENTITY), legs_of_seed(6).take(30));
 }
 
-/// Radii count in voxels along the terrain's own axes, wherever and however large it is.
+/// Radii are in voxels along the terrain's own axes, for any transform of the terrain.
 #[test]
 fn the_cover_of_a_terrain_that_is_moved_turned_and_scaled() {
     println!("seed 7");
@@ -146,7 +146,7 @@ fn the_cover_of_a_terrain_that_is_moved_turned_and_scaled() {
         rotation: Quat::from_rotation_y(1.1),
         scale: Vec3::splat(2.0),
     };
-    // Far away `f32` is too coarse for turned positions.
+    // Far away, `f32` is too coarse for rotated positions.
     let mut flight = Flight::new(patient_app(8), terrain, place);
     flight.area = 10.0;
     fly(flight, legs_of_seed(7).take(40));
@@ -181,7 +181,7 @@ fn without_viewers_nothing_is_loaded_and_after_them_nothing_is_left() {
     assert_eq!(entities.iter(flight.app.world()).count(), 0);
 }
 
-/// A viewer that is spawned far away loads nothing around the origin, where its place is not known yet.
+/// A viewer spawned far away loads nothing around the origin before its place is known.
 #[test]
 fn a_viewer_loads_where_it_is_from_its_first_update_on() {
     let mut flight = Flight::new(patient_app(16), hills(), Transform::IDENTITY);

@@ -1,4 +1,4 @@
-//! Edits outlive the samples around them: what was dug is there when its chunk comes back.
+//! Edits outlive the samples around them: a hole is there when its chunk is loaded again.
 
 use std::time::Duration;
 
@@ -22,12 +22,12 @@ fn flight() -> Flight {
     Flight::new(patient_app(), Terrain::endless(Hills::default()).with_chunk_cells(8), Transform::IDENTITY)
 }
 
-/// What has been reported of edits since the last time.
+/// The edit reports since the last call.
 fn reported(app: &App, cursor: &mut MessageCursor<TerrainEdited>) -> Vec<TerrainEdited> {
     cursor.read(app.world().resource::<Messages<TerrainEdited>>()).cloned().collect()
 }
 
-/// Where no viewer of these tests sees anything of the origin.
+/// A place from which no viewer of these tests sees the origin.
 const FAR: Vec3 = Vec3::new(40.0, 0.0, 0.0);
 
 #[test]
@@ -90,7 +90,7 @@ fn samples_that_many_stamps_have_changed_stay() {
     }
 }
 
-/// How many chunks near the origin there are.
+/// The number of chunks near the origin.
 fn samples_at_the_origin(flight: &Flight) -> usize {
     let is_near = |[x, _, z]: [i32; 3]| (-2..=2).contains(&x) && (-2..=2).contains(&z);
     volume(&flight.app, flight.terrain).grid().chunks().filter(|(position, _)| is_near(*position)).count()
@@ -208,7 +208,7 @@ fn an_edit_where_samples_were_dropped_shows_after_they_are_filled_again() {
 #[test]
 fn an_edit_shows_in_the_update_that_reads_it_while_others_load() {
     let mut flight = flight();
-    // In chunks this small even a small stamp touches many.
+    // Chunks this small: even a small stamp touches many.
     let mut settings = flight.app.world_mut().resource_mut::<MarchlessSettings>();
     (settings.max_jobs_per_update, settings.max_inline_chunks) = (Some(1), 27);
     let viewer = flight.viewers[0];

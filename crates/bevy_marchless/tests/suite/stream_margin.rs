@@ -1,4 +1,4 @@
-//! A terrain that is settled has no leaf that waits, also where viewers have come and gone.
+//! A settled terrain has no waiting leaf, also where viewers have come and gone.
 
 use std::time::Duration;
 
@@ -34,7 +34,7 @@ fn assert_settles(app: &mut App, terrain: Entity, around: Vec3, name: &str) {
     }
 }
 
-/// How long the main thread may work in an update: hardly at all, then all is left to later updates; and the default.
+/// Main-thread budgets: almost none, which leaves the work to later updates, and the default.
 const SHARES: [Duration; 2] = [Duration::ZERO, Duration::from_micros(600)];
 
 /// A viewer over hills of small chunks, in an app without threads.

@@ -1,6 +1,6 @@
-//! Nothing leaks, however long one flies, teleports and digs.
+//! Nothing leaks, however long a viewer flies, teleports and digs.
 //!
-//! The long one: `cargo test --release -p bevy_marchless --test suite stream_soak -- --ignored --nocapture`.
+//! Run it with `cargo test --release -p bevy_marchless --test suite stream_soak -- --ignored --nocapture`.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -13,20 +13,20 @@ use bevy_marchless::stats::TerrainStats;
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 
-/// What there is when everything around the origin is drawn.
+/// The counts when everything around the origin is drawn.
 #[derive(Clone, Copy, Debug)]
 struct Counts {
-    /// All entities but chunks.
+    /// All entities except chunks.
     others: usize,
     chunks: usize,
     mesh_assets: usize,
     /// Chunks with samples.
     samples: usize,
-    /// Who holds the source; each job does.
+    /// The references to the source; each job holds one.
     source: usize,
 }
 
-/// Leaves nobody but one viewer at the origin, waits until all is drawn, and counts.
+/// Keeps only one viewer, at the origin, waits until everything is drawn, and counts.
 fn counts_at_home(flight: &mut Flight) -> Counts {
     for viewer in core::mem::take(&mut flight.viewers) {
         flight.app.world_mut().despawn(viewer);
@@ -50,19 +50,19 @@ fn counts_at_home(flight: &mut Flight) -> Counts {
     }
 }
 
-/// Resident bytes of this process, where the system tells.
+/// The resident bytes of this process, if the system reports them.
 fn resident_bytes() -> Option<u64> {
     let pages = std::fs::read_to_string("/proc/self/statm").ok()?;
     Some(pages.split(' ').nth(1)?.parse::<u64>().ok()? * 4096)
 }
 
-/// Flies so many random legs within an area of 24 × 24 columns of chunks.
+/// Flies `legs` random legs within an area of 24 × 24 columns of chunks.
 fn soak(legs: usize, seed: u64) {
     println!("{legs} legs of seed {seed}");
     let terrain = Terrain::endless(Hills::default()).with_chunk_cells(8);
     let mut flight = Flight::new(app(), terrain, Transform::IDENTITY);
     flight.area = 12.0;
-    // Threads work behind, and the main thread has little time.
+    // Threads lag behind, and the main thread has little time.
     flight.lags = true;
     let start = Instant::now();
     let before = counts_at_home(&mut flight);

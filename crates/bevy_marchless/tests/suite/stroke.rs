@@ -1,4 +1,4 @@
-//! A stroke of 60 updates shows in every one of them, and is the same however it is cut.
+//! A stroke of 60 updates shows in each of them, and gives the same samples for any division into stamps.
 
 use crate::common::*;
 use bevy_ecs::prelude::*;
@@ -49,7 +49,7 @@ fn a_stroke_too_large_for_one_update_makes_progress_while_it_lasts() {
         }
     }
     assert!(shown >= 10, "shown only {shown} times");
-    // One group that is being meshed and one that waits: eight chunks each, three an update.
+    // One group is being meshed and one waits: eight chunks each, three per update.
     for _ in 0..8 {
         app.update();
     }

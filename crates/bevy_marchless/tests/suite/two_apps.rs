@@ -1,4 +1,4 @@
-//! Two apps in one process, a server's and a client's, do not notice each other: the same stamps give the same terrain.
+//! Two apps in one process, a server's and a client's, do not affect each other: the same stamps give the same terrain.
 
 use crate::common::*;
 use bevy_ecs::prelude::*;
@@ -28,7 +28,7 @@ fn a_server_and_a_client() {
     let on_server = geometry(&mut server, on_server);
     assert!(on_server == geometry(&mut client, on_client));
 
-    // The one goes on when the other has ended.
+    // One app continues after the other has ended.
     drop(server);
     let other = settled(&mut client, ground());
     assert_drawn(&mut client, other);

@@ -1,4 +1,4 @@
-//! Without assets there is geometry all the same.
+//! Without assets, chunks still have geometry.
 
 use crate::common::*;
 use bevy_app::{App, TaskPoolPlugin};

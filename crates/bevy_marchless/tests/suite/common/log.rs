@@ -1,4 +1,4 @@
-//! What the plugin has said in the log.
+//! Records the plugin's log messages.
 
 use std::sync::Mutex;
 
@@ -33,13 +33,13 @@ impl Visit for Message {
     }
 }
 
-/// Begins to record. A process has one log, so a file may have one test that records.
+/// Starts recording. A process has one log, so a file may have one test that records.
 pub fn record() {
     let log = bevy_log::tracing_subscriber::registry().with(Recorder);
     tracing::subscriber::set_global_default(log).expect("no other log");
 }
 
-/// Takes what has been said since.
+/// Takes the messages since the last call.
 pub fn said() -> Vec<String> {
     core::mem::take(&mut LOG.lock().unwrap())
 }

@@ -22,21 +22,21 @@ use bevy_transform::TransformPlugin;
 use bevy_transform::components::Transform;
 use marchless::{MeshBuffer, MeshReport};
 
-/// What `MinimalPlugins` and `TransformPlugin` bring, and the plugin. Jobs run on threads.
+/// An app with `MinimalPlugins`, `TransformPlugin` and the plugin. Jobs run on threads.
 pub fn bare_app() -> App {
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, MarchlessPlugins));
     app
 }
 
-/// The same with mesh assets.
+/// An app like [`app`], with mesh assets.
 pub fn app() -> App {
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), TransformPlugin, AssetPlugin::default(), MeshPlugin, MarchlessPlugins));
     app
 }
 
-/// The same without threads: so many jobs an update, always in the same order.
+/// An app like [`app`] without threads: a fixed number of jobs per update, always in the same order.
 pub fn app_with_budget(budget: usize) -> App {
     let mut app = app();
     app.insert_resource(MarchlessSettings { max_jobs_per_update: Some(budget), ..MarchlessSettings::default() });
@@ -95,7 +95,7 @@ pub fn geometry(app: &mut App, terrain: Entity) -> Vec<(IVec3, Arc<MeshBuffer>)>
     all
 }
 
-/// What the samples ask for: each chunk meshed afresh, in order of position.
+/// The expected geometry: each chunk meshed from the samples, in order of position.
 pub fn expected_geometry(app: &App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)> {
     let volume = volume(app, terrain);
     let settings = volume.settings().expect("good settings");
@@ -115,7 +115,7 @@ pub fn expected_geometry(app: &App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)>
         .collect()
 }
 
-/// Asserts that what is drawn is what the samples ask for.
+/// Asserts that the drawn meshes are those of the samples.
 pub fn assert_drawn(app: &mut App, terrain: Entity) {
     let expected = expected_geometry(app, terrain);
     let drawn = geometry(app, terrain);
@@ -127,19 +127,19 @@ pub fn assert_drawn(app: &mut App, terrain: Entity) {
     }
 }
 
-/// The same where all stamps came at the isovalue that the terrain has now.
+/// Calls [`assert_as_new_after`] with stamps that all apply at the terrain's current isovalue.
 pub fn assert_as_new(app: &mut App, terrain: Entity, stamps: &[Stamp]) {
     let settings = app.world().get::<Terrain>(terrain).expect("a terrain").clone();
     let stamps: Vec<_> = stamps.iter().map(|stamp| core_stamp(stamp, settings.isovalue)).collect();
     assert_as_new_after(app, terrain, &stamps);
 }
 
-/// A stamp as it is applied to a terrain at an isovalue.
+/// The core's form of a stamp at an isovalue.
 pub fn core_stamp(stamp: &Stamp, isovalue: f32) -> marchless::QuantisedStamp {
     stamp.quantised().expect("numbers in range").with_isovalue(isovalue)
 }
 
-/// Asserts that what is drawn is what a new terrain of the same settings would show after these stamps. The terrain is bounded.
+/// Asserts that a bounded terrain draws the same as a new terrain of the same settings would after these stamps.
 pub fn assert_as_new_after(app: &mut App, terrain: Entity, stamps: &[marchless::QuantisedStamp]) {
     let settings = app.world().get::<Terrain>(terrain).expect("a terrain").clone();
     let mut fresh = stream::Fresh::new(&settings);
@@ -176,7 +176,7 @@ pub fn assert_coloured(app: &mut App, terrain: Entity) {
     }
 }
 
-/// The union of all chunks drawn of a terrain, with the vertices on shared borders merged.
+/// The union of a terrain's drawn chunks, with the vertices on shared borders merged.
 pub fn report(app: &mut App, terrain: Entity) -> MeshReport {
     let cells = volume(app, terrain).grid().chunk_cells() as i32;
     let mut positions = Vec::new();
@@ -197,7 +197,7 @@ pub fn report(app: &mut App, terrain: Entity) -> MeshReport {
     MeshReport::new(&positions, &indices)
 }
 
-/// What a ray towards a point hits, of all visible terrains.
+/// The hit of a ray towards a point, on all visible terrains.
 pub fn cast(app: &mut App, origin: Vec3, towards: Vec3, max_distance: f32) -> Option<TerrainHit> {
     let ray = Ray3d::new(origin, Dir3::new(towards - origin).unwrap());
     app.world_mut().run_system_once(move |terrains: TerrainQuery| terrains.ray_cast(ray, max_distance)).unwrap()
@@ -207,7 +207,7 @@ pub fn mesh_assets(app: &App) -> usize {
     app.world().resource::<Assets<Mesh>>().len()
 }
 
-/// A source that stops where it is until the gate is opened, and can tell whether it was reached.
+/// A source that stops until its gate is opened, and counts how often it was reached.
 #[derive(Clone, Default)]
 pub struct Gate {
     open: Arc<AtomicBool>,
@@ -219,7 +219,7 @@ impl Gate {
         self.open.store(true, Ordering::Release);
     }
 
-    /// How often somebody has come to the gate.
+    /// How often the gate was reached.
     pub fn reached(&self) -> u32 {
         *self.reached.lock().unwrap()
     }
@@ -236,7 +236,7 @@ impl Gate {
     }
 }
 
-/// Waves without end, known to be empty far above and below.
+/// Endless waves, with bounds that are certain far above and below.
 pub struct Waves;
 
 impl Source for Waves {
@@ -257,7 +257,7 @@ impl Source for Waves {
     }
 }
 
-/// A world of them, in chunks of 8 voxels.
+/// A terrain of endless waves, in chunks of 8 voxels.
 pub fn world() -> Terrain {
     Terrain::endless(Waves).with_chunk_cells(8)
 }

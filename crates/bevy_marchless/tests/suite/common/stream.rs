@@ -1,5 +1,5 @@
-//! What the tests of streaming share: a cheap world, random flights through it, a check of the cover in every update, and
-//! what a world that nobody flew through would show.
+//! Shared by the tests of streaming: a cheap terrain, random flights through it, a check of the cover in every update,
+//! and a fresh terrain to compare with.
 #![allow(unused_imports, reason = "each test uses a part of it")]
 
 mod cover;

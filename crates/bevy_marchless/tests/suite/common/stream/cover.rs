@@ -1,4 +1,4 @@
-//! What holds of the cover in every update, computed from the viewers alone.
+//! Checks of the cover in every update, computed from the viewers alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,10 +15,10 @@ use marchless::Region;
 use super::Fresh;
 use crate::common::volume;
 
-/// How much farther than asked for the plugin may load and keep, in chunks.
+/// The extra distance in which the plugin may load and keep chunks. [Units: chunks]
 pub const SLACK: f64 = 0.25;
 
-/// What one viewer sees, in voxels of the terrain.
+/// The view of one viewer, in voxels of the terrain.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub center: DVec3,
@@ -27,7 +27,7 @@ pub struct View {
 }
 
 impl View {
-    /// What the viewers of an app see of a terrain; viewers without a parent.
+    /// The views of an app's viewers on a terrain; the viewers have no parent.
     pub fn all(app: &mut App, terrain: Entity) -> Vec<Self> {
         let world = app.world_mut();
         let place = world.get::<Transform>(terrain).expect("a terrain has a place").to_matrix().as_dmat4().inverse();
@@ -43,14 +43,14 @@ impl View {
             .collect()
     }
 
-    /// Whether some point of a chunk lies within its radii and so many voxels more.
+    /// Whether any point of a chunk lies within the view's radii plus some voxels.
     pub fn reaches(&self, position: [i32; 3], cells: u32, more: f64) -> bool {
         let low = IVec3::from(position).as_dvec3() * f64::from(cells);
         let nearest = self.center.clamp(low, low + f64::from(cells));
         ((nearest - self.center) / (self.radii + more)).length_squared() <= 1.0
     }
 
-    /// The chunks in range, grown by so many voxels.
+    /// The chunks in range, with the range grown by some voxels.
     pub fn chunks(&self, cells: u32, more: f64) -> Vec<[i32; 3]> {
         let cell = f64::from(cells);
         let low = ((self.center - self.radii - more) / cell).floor().as_ivec3() - 1;
@@ -60,7 +60,7 @@ impl View {
     }
 }
 
-/// The chunks drawn in the update before, so that it can be told which have gone.
+/// The chunks drawn in the last update, to find those that have gone.
 #[derive(Default)]
 pub struct Cover {
     drawn: BTreeMap<[i32; 3], Entity>,
@@ -68,7 +68,7 @@ pub struct Cover {
 }
 
 impl Cover {
-    /// Checks everything that holds in every update. `lags`: chunks out of range may go some updates later.
+    /// Checks everything that must hold in every update. `lags`: chunks out of range may go some updates later.
     pub fn check(&mut self, app: &mut App, terrain: Entity, fresh: &Fresh, lags: bool) {
         let views = View::all(app, terrain);
         self.updates += 1;
@@ -114,7 +114,7 @@ impl Cover {
     }
 }
 
-/// Which chunks a terrain keeps whoever looks.
+/// The chunks that a terrain keeps without viewers.
 fn kept_region(volume: &TerrainVolume) -> Region {
     let region = |extent: Extent| Region::new(extent.min.to_array(), extent.max.to_array());
     volume.settings().map_or(Region::new([0; 3], [0; 3]), |terrain| match terrain.keep {
@@ -124,8 +124,8 @@ fn kept_region(volume: &TerrainVolume) -> Region {
     })
 }
 
-/// The entities of a terrain's chunks that have something to draw, by position. No two chunks share one; where all has been
-/// dug away, the entity may stay without a mesh.
+/// The entities of a terrain's chunks with a mesh, by position. No two chunks share a position. Where everything has
+/// been dug away, the entity may stay without a mesh.
 pub fn drawn_chunks(app: &mut App, terrain: Entity) -> BTreeMap<[i32; 3], Entity> {
     let world = app.world_mut();
     let mut chunks = world.query::<(Entity, &Chunk, &ChunkGeometry, Option<&Mesh3d>, &ChildOf)>();
@@ -148,7 +148,7 @@ pub fn drawn_chunks(app: &mut App, terrain: Entity) -> BTreeMap<[i32; 3], Entity
     drawn
 }
 
-/// The counts are those of the leaves.
+/// Checks that the counts are those of the leaves.
 fn check_counts(volume: &TerrainVolume, views: &[View], drawn: &BTreeMap<[i32; 3], Entity>) {
     let coverage = volume.coverage();
     assert_eq!(coverage.drawn, drawn.len(), "{coverage:?}");
@@ -164,6 +164,6 @@ fn check_counts(volume: &TerrainVolume, views: &[View], drawn: &BTreeMap<[i32; 3
             LeafState::Drawn => counted.drawn += 1,
         }
     }
-    // What lags or is kept may lie farther away.
+    // Chunks that lag or are kept may lie farther away.
     assert!(counted.drawn <= coverage.drawn && counted.waiting <= coverage.waiting && counted.empty <= coverage.empty);
 }

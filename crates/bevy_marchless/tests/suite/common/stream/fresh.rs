@@ -1,11 +1,11 @@
-//! What a world shows that nobody flew through: sampled chunk by chunk, with the same stamps in the same order.
+//! A fresh terrain to compare with: sampled chunk by chunk, with the same stamps in the same order.
 
 use std::collections::{HashMap, HashSet};
 
 use bevy_marchless::prelude::*;
 use marchless::{Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Region, SamplePool};
 
-/// A plain world beside the plugin's: only the core, no entity, no task.
+/// A terrain made with the core only, without entities and tasks.
 pub struct Fresh {
     terrain: Terrain,
     grid: Grid<i16>,
@@ -24,7 +24,7 @@ impl Fresh {
         Self { terrain: terrain.clone(), grid, stamps: HashMap::new(), edited: HashSet::new(), mesher: Mesher::new() }
     }
 
-    /// Which chunks there may be.
+    /// The chunks in the terrain's extent.
     pub fn extent(&self) -> Region {
         self.grid.bounds().expect("bounded")
     }
@@ -47,7 +47,7 @@ impl Fresh {
         around(position).points().any(|position| self.edited.contains(&position))
     }
 
-    /// How many chunks have been touched by stamps.
+    /// The number of chunks that stamps have touched.
     pub fn edited_chunks(&self) -> usize {
         self.edited.len()
     }

@@ -1,4 +1,4 @@
-//! A cheap endless world whose bounds are true: hills, and caves below them.
+//! A cheap endless source with true bounds: hills, and caves below them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,10 +11,10 @@ pub struct Hills {
     fills: Arc<AtomicU64>,
 }
 
-/// In each cube of so many units there may be a cave.
+/// The edge of the cubes that may hold a cave each. [Units: world]
 const ROOM: f64 = 24.0;
 const CAVE: f64 = 7.0;
-/// Below this the ground is of material 2, above of material 1.
+/// The height below which the ground is of material 2; above, it is of material 1.
 const ROCK: f64 = -30.0;
 
 impl Hills {
@@ -34,7 +34,7 @@ impl Hills {
         (y - Self::height(x, z)).max(cave.max(-5.0))
     }
 
-    /// What lies in a box of world positions. `hills`: the lowest and the highest ground over it.
+    /// The bound of a box of world positions. `hills`: the lowest and the highest ground over it.
     fn bound_box([low, high]: [[f64; 3]; 2], hills: [f64; 2]) -> Bound {
         if low[1] > hills[1] {
             return Bound::Outside;
@@ -103,7 +103,7 @@ fn middle(room: [f64; 3]) -> [f64; 3] {
     room.map(|v| (v + 0.5) * ROOM)
 }
 
-/// In one room of four, below the hills.
+/// One cube in four holds a cave, if it lies below the hills.
 fn has_cave([x, y, z]: [f64; 3]) -> bool {
     let mix =
         (x as i64).wrapping_mul(73_856_093) ^ (y as i64).wrapping_mul(19_349_663) ^ (z as i64).wrapping_mul(83_492_791);

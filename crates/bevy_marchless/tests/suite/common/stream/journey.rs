@@ -1,4 +1,4 @@
-//! Random flights, and flying them.
+//! Random flights, and the apps that fly them.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,19 +21,19 @@ use crate::common::{geometry, volume};
 /// A part of a flight. All lengths are in chunks.
 #[derive(Clone, Debug)]
 pub enum Leg {
-    /// A viewer flies straight on; `step` an update.
+    /// A viewer flies straight on, `step` chunks per update.
     Fly { viewer: usize, step: Vec3, updates: u32 },
-    /// A viewer is somewhere else at once.
+    /// A viewer jumps to another place.
     Teleport { viewer: usize, to: Vec3 },
-    /// One viewer more, at most three.
+    /// A viewer is added, up to three.
     Spawn { at: Vec3, radii: Vec3, margin: f32 },
-    /// One viewer less.
+    /// A viewer is removed.
     Despawn { viewer: usize },
-    /// An edit, seen from a viewer; its height counts from the ground.
+    /// An edit at a place relative to a viewer; its height counts from the ground.
     Edit { viewer: usize, offset: Vec3, radius: f32, operation: BrushOperation },
-    /// Nothing, for some updates.
+    /// Some updates pass.
     Wait { updates: u32 },
-    /// Until everything is drawn; then that is compared with a fresh world.
+    /// Updates pass until everything is drawn, and the result is compared with a fresh terrain.
     Settle,
 }
 
@@ -67,12 +67,12 @@ pub fn leg() -> impl Strategy<Value = Leg> {
     ]
 }
 
-/// A flight of so many legs.
+/// A random flight, with a number of legs in this range.
 pub fn legs(count: core::ops::Range<usize>) -> impl Strategy<Value = Vec<Leg>> {
     prop::collection::vec(leg(), count)
 }
 
-/// Random legs without end; the same seed gives the same.
+/// Endless random legs; the same seed gives the same legs.
 pub fn legs_of_seed(seed: u64) -> impl Iterator<Item = Leg> {
     let mut bytes = [0; 32];
     bytes[..8].copy_from_slice(&seed.to_le_bytes());
@@ -82,22 +82,22 @@ pub fn legs_of_seed(seed: u64) -> impl Iterator<Item = Leg> {
     core::iter::repeat_with(move || leg.new_tree(&mut runner).expect("nothing is filtered").current())
 }
 
-/// A flight through a terrain, of which every update is checked.
+/// A flight through a terrain that checks every update.
 pub struct Flight {
     pub app: App,
     pub terrain: Entity,
     pub viewers: Vec<Entity>,
-    /// What the same world shows that nobody flew through.
+    /// The fresh terrain to compare with.
     pub fresh: Fresh,
     /// All stamps, in order.
     pub stamps: Vec<Stamp>,
     /// The viewers' distance within which samples stay.
     pub sample_radius: f32,
-    /// How far from the origin viewers get along x and z, in chunks.
+    /// The greatest distance of viewers from the origin along x and z, in chunks.
     pub area: f32,
     /// Whether chunks out of range may go some updates later.
     pub lags: bool,
-    /// How long other threads may work between two updates.
+    /// The time that other threads get between two updates.
     pub pause: Duration,
     cover: Cover,
 }
@@ -123,7 +123,7 @@ impl Flight {
         flight
     }
 
-    /// An update, and the check of what holds in each.
+    /// Runs an update, and checks everything that must hold in each.
     pub fn update(&mut self) {
         self.app.update();
         self.cover.check(&mut self.app, self.terrain, &self.fresh, self.lags);
@@ -211,7 +211,7 @@ impl Flight {
         self.app.world_mut().write_message(stamp);
     }
 
-    /// Updates until everything in range is drawn as it is, at most 5,000 times, each checked.
+    /// Updates until everything in range is drawn and up to date, at most 5,000 times, with a check in each.
     pub fn settle(&mut self) -> u32 {
         for updates in 0..5_000 {
             self.update();
@@ -225,7 +225,7 @@ impl Flight {
         panic!("not settled in 5,000 updates: {:?}", volume(&self.app, self.terrain).coverage());
     }
 
-    /// The same, and everything in range and on the screen is as a fresh world shows it.
+    /// Settles, and asserts that all chunks in range and all drawn ones equal those of the fresh terrain.
     pub fn settle_and_compare(&mut self) {
         self.settle();
         let lags = core::mem::replace(&mut self.lags, false);
@@ -254,14 +254,14 @@ impl Flight {
         }
     }
 
-    /// The geometry of every chunk that has something to draw, in order of position.
+    /// The geometry of every chunk with a mesh, in order of position.
     pub fn drawn(&mut self) -> Vec<(IVec3, Arc<MeshBuffer>)> {
         let mut all = geometry(&mut self.app, self.terrain);
         all.retain(|(_, mesh)| !mesh.is_empty());
         all
     }
 
-    /// What was drawn before is to count no more: its settings have changed.
+    /// Forgets the chunks drawn before, because the terrain's settings have changed.
     pub fn forget_what_was_drawn(&mut self) {
         self.cover = Cover::default();
     }
@@ -270,7 +270,7 @@ impl Flight {
         (!self.viewers.is_empty()).then(|| self.viewers[number % self.viewers.len()])
     }
 
-    /// Where a viewer is, in chunks from the terrain's origin.
+    /// A viewer's place, in chunks from the terrain's origin.
     pub fn position(&self, viewer: Entity) -> Vec3 {
         let world = self.app.world().get::<Transform>(viewer).expect("a viewer has a place").translation;
         let place = self.terrain_place();
@@ -297,13 +297,13 @@ impl Flight {
         self.settings().chunk_cells as f32
     }
 
-    /// In the terrain's own space.
+    /// The length of a chunk in the terrain's own space.
     fn chunk_size(&self) -> f32 {
         self.cells() * self.voxel_size()
     }
 }
 
-/// Whether two chunks have the same samples, however they are kept.
+/// Whether two chunks have the same samples, in whatever form.
 pub fn same_samples(a: &Samples<i16>, b: &Samples<i16>, cells: u32) -> bool {
     a == b || (0..cells.pow(3) as usize).all(|index| a.voxel(index) == b.voxel(index))
 }
