@@ -6,13 +6,7 @@
 //! use bevy_marchless::prelude::*;
 //! use bevy_math::Vec3;
 //!
-//! fn main() {
-//!     let mut app = App::new();
-//!     // `DefaultPlugins` in a game; a server needs no more than this.
-//!     app.add_plugins((TaskPoolPlugin::default(), bevy_transform::TransformPlugin, MarchlessPlugins));
-//!     app.add_systems(Startup, setup).add_systems(Update, dig);
-//!     app.update();
-//! }
+//! A game adds `DefaultPlugins` instead; a server needs only these.
 //!
 //! /// Hills, about 40 voxels high.
 //! fn setup(mut commands: Commands) {
@@ -25,32 +19,36 @@
 //! ```
 //!
 //! # How it works
-//! A [`Terrain`](terrain::Terrain), of a fixed extent or endless, is filled from its [`Source`](source::Source), chunk by
-//! chunk, in tasks: all of it, or what [`TerrainViewer`](stream::TerrainViewer)s see. Its
-//! samples live in one place, its [`TerrainVolume`](terrain::TerrainVolume), which [`Stamp`](brush::Stamp) messages change;
-//! [`Chunk`](chunk::Chunk) entities, its children, mirror what is drawn. All chunks that an edit changes are
-//! meshed from one snapshot and shown in one update, a small edit in the update that reads its stamp. A
-//! [`TerrainQuery`](query::TerrainQuery) tells what a ray hits. Everything runs in `PostUpdate`
-//! ([`MarchlessSystems`](schedule::MarchlessSystems)), so what `Update` asks for shows in the same frame. How
-//! chunks get components of a game's own, module [`inherit`] tells; how terrain gets on with the rest of Bevy, module [`in_your_game`].
+//! A [`Terrain`](terrain::Terrain) has a fixed extent or is endless. Tasks fill it chunk by chunk from its
+//! [`Source`](source::Source): either all of it, or the parts near [`TerrainViewer`](stream::TerrainViewer)s.
+//!
+//! The samples live in one place, the [`TerrainVolume`](terrain::TerrainVolume). [`Stamp`](brush::Stamp) messages
+//! change them. [`Chunk`](chunk::Chunk) entities are children of the terrain and mirror what is drawn. All chunks that
+//! an edit changes are meshed from one snapshot and shown in one update. A small edit shows in the update that reads
+//! its stamp. A [`TerrainQuery`](query::TerrainQuery) casts rays.
+//!
+//! Everything runs in `PostUpdate` ([`MarchlessSystems`](schedule::MarchlessSystems)), so changes made in `Update` show
+//! in the same frame. Module [`inherit`] gives chunks components of the game's own. Module [`in_your_game`] describes
+//! how terrain works with the rest of Bevy.
 //!
 //! # What is guaranteed
-//! - The same stamps in the same order give the same samples, bit for bit, on any machine, whatever the threads do and
-//!   wherever viewers are; what a source gives is up to its floating point.
-//! - Neighbouring chunks share their borders bit for bit, and never show different states of an edit.
-//! - Bad settings, stamps, rays and sources that panic are refused or reported; the game goes on.
+//! - The same stamps in the same order give the same samples, bit for bit, on any machine. Threads and the positions of
+//!   viewers make no difference. A source's own samples depend on its floating-point arithmetic.
+//! - Neighbouring chunks share their borders bit for bit and never show different states of an edit.
+//! - Invalid settings, stamps and rays are refused or reported, and so are sources that panic; the game keeps running.
 //!
-//! # What is not
-//! - There is one level of detail. Edits are neither saved nor undone; those of chunks that are unloaded stay in memory.
-//! - Samples are changed on the main thread: a brush over 50 voxels in radius takes many milliseconds.
-//! - With Bevy's `RenderAssetBytesPerFrame` below what a group needs, its meshes may reach the screen frames apart.
+//! # What is not guaranteed
+//! - There is one level of detail. Edits cannot be saved or undone. Edits of unloaded chunks stay in memory.
+//! - The main thread changes the samples: a brush over 50 voxels in radius takes many milliseconds.
+//! - If Bevy's `RenderAssetBytesPerFrame` is smaller than a group's meshes, they may reach the screen in different
+//!   frames.
 //!
 //! # Features
-//! On by default: `pbr` (materials), `gizmos` (bounds and states of chunks), `noise` and `png` (sources). Without them, and without any
-//! renderer, terrain has geometry all the same ([`ChunkGeometry`](chunk::ChunkGeometry)).
+//! On by default: `pbr` (materials), `gizmos` (bounds and states of chunks), `noise` and `png` (sources). Terrain has
+//! geometry without these features and without a renderer ([`ChunkGeometry`](chunk::ChunkGeometry)).
 //!
-//! Off by default: `big_space` puts chunks into the cells of a `big_space` grid, for worlds of any size. `serde` lets
-//! settings be written and read. `terrain_files`, which includes it, has terrains follow files in `assets`, also while the
+//! Off by default: `big_space` puts chunks into the cells of a `big_space` grid, for worlds of any size. `serde` makes
+//! settings serialisable. `terrain_files` includes `serde`; with it, terrains follow files in `assets`, even while the
 //! game runs (module `world`).
 
 #[cfg(feature = "big_space")]
@@ -65,7 +63,7 @@ pub mod diagnostics;
 pub mod file;
 #[cfg(feature = "gizmos")]
 pub mod gizmos;
-/// How terrain gets on with the rest of Bevy: states, parents, visibility, picking, time, pausing and more.
+/// How terrain works with the rest of Bevy: states, parents, visibility, picking, time, pausing and more.
 ///
 #[cfg_attr(feature = "pbr", doc = include_str!("../docs/in_your_game.md"))]
 pub mod in_your_game {}
@@ -87,8 +85,8 @@ use bevy_app::plugin_group;
 
 pub use marchless;
 
-/// What a game that uses terrain usually needs. Sources are in [`source::prelude`], what [`TerrainBits`](bits::TerrainBits)
-/// answers with in [`bits::prelude`].
+/// The types that a game with terrain usually needs. Sources are in [`source::prelude`], the answers of
+/// [`TerrainBits`](bits::TerrainBits) in [`bits::prelude`].
 pub mod prelude {
     pub use crate::MarchlessPlugins;
     pub use crate::brush::{BrushOperation, BrushShape, Stamp, Stroke, TerrainEdited};
@@ -105,7 +103,7 @@ pub mod prelude {
 }
 
 plugin_group! {
-    /// Everything that terrain needs. Each part can be disabled or replaced.
+    /// All plugins of the terrain. Each one can be disabled or replaced.
     #[derive(Debug)]
     pub struct MarchlessPlugins {
         schedule:::SchedulePlugin,

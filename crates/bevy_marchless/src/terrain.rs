@@ -1,4 +1,4 @@
-//! [`Terrain`]: a terrain's settings and source; give it to an entity, and chunks appear.
+//! [`Terrain`]: a terrain's settings and source. Insert it on an entity, and chunks appear.
 
 mod extent;
 mod handle;
@@ -25,65 +25,64 @@ use crate::schedule::UpdatePhase;
 use crate::source::Air;
 use crate::volume::SamplingSettings;
 
-/// A terrain, its settings and what it is made of.
+/// A terrain: its settings and its source.
 ///
-/// Samples lie on a lattice, one voxel apart; the terrain's origin is lattice point 0, the lowest corner of chunk 0. The
-/// entity's `Transform` moves, turns and scales the whole terrain; several terrains may live side by side.
+/// Samples lie on a lattice, one voxel apart. The terrain's origin is lattice point 0, the lowest corner of chunk 0.
+/// The entity's `Transform` moves, turns and scales the whole terrain. Several terrains may exist side by side.
 ///
-/// A terrain [of a fixed extent](Terrain::new) is loaded as a whole; an [endless](Terrain::endless) one where a
-/// [`TerrainViewer`](crate::stream::TerrainViewer) is near.
+/// A terrain [of a fixed extent](Terrain::new) is loaded as a whole. An [endless](Terrain::endless) one is loaded
+/// around [`TerrainViewer`](crate::stream::TerrainViewer)s.
 ///
-/// Changing `source`, `chunk_cells` or `voxel_size` fills the terrain anew, and what was dug is gone. However often
-/// they change, what is under way is shown before the newest begins; stamps wait for it.
-/// Changing `extent` or `keep` loads and unloads chunks: what stays in the extent stays as it is, and what was dug comes back
-/// with its chunks, also where a brush reached over the border. Another `isovalue` shows in one update, once all is meshed for it; other
-/// `normals` and another `palette` show chunk by chunk. Settings out of range are refused with an error in the log and a
-/// [`TerrainError`] component; those before them stay in effect.
+/// Changing `source`, `chunk_cells` or `voxel_size` fills the terrain anew and discards all edits. The world under way
+/// is shown before the newest settings take effect, however often they change. Stamps wait for it.
 ///
-/// Outside of its extent there is air, so that its surface is closed, with flat walls at its border.
+/// Changing `extent` or `keep` loads and unloads chunks. Chunks that stay inside the extent keep their state, and edits
+/// come back with their chunks, even where a brush reached across the border. Another `isovalue` shows in one update,
+/// as soon as every chunk is meshed for it. Other `normals` and another `palette` show chunk by chunk.
+///
+/// Settings out of range are refused with an error in the log and a [`TerrainError`] component; the previous settings
+/// stay in effect.
+///
+/// Outside the extent there is air: the surface is closed there by flat walls.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;
 /// # use bevy_ecs::prelude::*;
 /// # use bevy_math::UVec3;
 ///
-/// fn setup(mut commands: Commands) {
-///     // A ball of radius 40 in the middle of 128³ voxels: the distance from its surface at each position.
-///     let ball = |[x, y, z]: [f64; 3]| ((x - 64.0).powi(2) + (y - 64.0).powi(2) + (z - 64.0).powi(2)).sqrt() - 40.0;
-///     commands.spawn(Terrain::new(ball).with_extent(UVec3::splat(4)));
-/// }
+/// A ball of radius 40 in the middle of 128³ voxels: the distance to its surface at each position.
 /// ```
 #[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Default, Debug, Clone)]
 #[require(Transform, Visibility, TerrainVolume)]
 pub struct Terrain {
-    /// Which chunks it has; at least 1 an axis. Default: 8 × 4 × 8 from chunk 0 on.
+    /// The chunks that the terrain has, at least 1 per axis. Default: 8 × 4 × 8, starting at chunk 0.
     pub extent: Extent,
-    /// Which of them are loaded whoever looks; at most [`Terrain::MAX_CHUNKS`]. Default: all.
+    /// The chunks of the extent that are loaded even without a viewer; at most [`Terrain::MAX_CHUNKS`]. Default: all.
     pub keep: Keep,
-    /// Cells of a chunk per axis, 8 to 62. Default 32.
+    /// Cells of a chunk per axis, from 8 to 62. Default 32.
     pub chunk_cells: u32,
-    /// The distance between two samples, in world units; above 0. Default 1.
+    /// The distance between neighbouring samples, in world units; above 0. Default 1.
     pub voxel_size: f32,
     /// The surface lies where the weight equals this many voxels; finite. Default 0.
     ///
-    /// Brushes dig into, add to and paint the surface at this isovalue, up to ±124 voxels. They leave weights within 4 voxels
-    /// of it, so that another isovalue farther away shows nothing of what they did before. Sources skip chunks more than
-    /// 4 voxels from their surface, so isovalues beyond about ±3 may show seams there.
+    /// Brushes dig into, add to and paint the surface at this isovalue, up to ±124 voxels. They write weights within 4
+    /// voxels of it, so earlier edits are invisible at an isovalue farther away. Sources skip chunks more than 4 voxels
+    /// from their surface, so isovalues beyond about ±3 may show seams there.
     pub isovalue: f32,
     /// Whether meshes have normals. Default true.
     pub normals: bool,
-    /// The colours of the materials.
+    /// The colours of materials.
     pub palette: Palette,
-    /// What the terrain is made of before it is edited. Default: air.
+    /// The source of the samples before any edit. Default: air.
     pub source: SourceHandle,
 }
 
 impl Terrain {
-    /// The most chunks that a terrain may keep loaded, and that may be loaded around a viewer.
+    /// The most chunks that a terrain may keep loaded, and the most that may be loaded around one viewer.
     pub const MAX_CHUNKS: u64 = 65_536;
 
-    /// A terrain made of `source`, with the default settings.
+    /// Creates a terrain from `source`, with the default settings.
     pub fn new(source: impl Source) -> Self {
         Self {
             extent: UVec3::new(8, 4, 8).into(),
@@ -97,77 +96,77 @@ impl Terrain {
         }
     }
 
-    /// A terrain without any border, made of `source`, loaded where viewers are near.
+    /// Creates a terrain without borders from `source`; it is loaded near viewers.
     pub fn endless(source: impl Source) -> Self {
         Self { extent: Extent::ENDLESS, keep: Keep::Nothing, ..Self::new(source) }
     }
 
-    /// The same terrain with these chunks: so many from chunk 0 on, or an [`Extent`].
+    /// Sets the extent: a number of chunks per axis, starting at chunk 0, or an [`Extent`].
     #[must_use]
     pub fn with_extent(self, extent: impl Into<Extent>) -> Self {
         Self { extent: extent.into(), ..self }
     }
 
-    /// The same terrain with these chunks loaded whoever looks.
+    /// Sets the chunks that are loaded even without a viewer.
     #[must_use]
     pub fn with_keep(self, keep: Keep) -> Self {
         Self { keep, ..self }
     }
 
-    /// The same terrain with chunks of so many cells per axis.
+    /// Sets the number of cells of a chunk per axis.
     #[must_use]
     pub fn with_chunk_cells(self, chunk_cells: u32) -> Self {
         Self { chunk_cells, ..self }
     }
 
-    /// The same terrain with samples so far apart, in world units.
+    /// Sets the distance between neighbouring samples, in world units.
     #[must_use]
     pub fn with_voxel_size(self, voxel_size: f32) -> Self {
         Self { voxel_size, ..self }
     }
 
-    /// The same terrain with another isovalue, in voxels.
+    /// Sets the isovalue, in voxels.
     #[must_use]
     pub fn with_isovalue(self, isovalue: f32) -> Self {
         Self { isovalue, ..self }
     }
 
-    /// The same terrain with or without normals.
+    /// Sets whether meshes have normals.
     #[must_use]
     pub fn with_normals(self, normals: bool) -> Self {
         Self { normals, ..self }
     }
 
-    /// The same terrain in other colours.
+    /// Sets the colours of materials.
     #[must_use]
     pub fn with_palette(self, palette: Palette) -> Self {
         Self { palette, ..self }
     }
 
-    /// Makes the terrain of another source; what was dug is gone.
+    /// Replaces the source; all edits are discarded.
     pub fn set_source(&mut self, source: impl Source) {
         self.source = SourceHandle::new(source);
     }
 
-    /// Makes the terrain of nothing but air.
+    /// Replaces the source by air; all edits are discarded.
     pub fn clear(&mut self) {
         self.set_source(Air);
     }
 
-    /// How large the terrain is, in voxels per axis; saturates where it is endless.
+    /// The terrain's size in voxels per axis; saturates for endless terrains.
     pub fn size_in_voxels(&self) -> UVec3 {
         self.extent.size().saturating_mul(UVec3::splat(self.chunk_cells))
     }
 
-    /// How large the terrain is in its own space, in world units per axis.
+    /// The terrain's size in its own space, in world units per axis.
     pub fn size(&self) -> Vec3 {
         self.size_in_voxels().as_vec3() * self.voxel_size
     }
 
-    /// Whether all settings are within their ranges.
+    /// Checks that all settings are within their ranges.
     ///
     /// # Errors
-    /// [`TerrainError`] about the first that is not.
+    /// [`TerrainError`] for the first setting out of range.
     pub fn check(&self) -> Result<(), TerrainError> {
         if marchless::Grid::<i16>::new(self.chunk_cells).is_err() {
             return Err(TerrainError::ChunkCells { found: self.chunk_cells });
@@ -188,25 +187,25 @@ impl Terrain {
         Ok(())
     }
 
-    /// The chunks that it has.
+    /// The chunks of the extent that can be addressed.
     pub(crate) fn chunk_region(&self) -> Region {
         self.extent.region(self.chunk_cells)
     }
 
-    /// The chunks that are loaded whoever looks.
+    /// The chunks that are loaded even without a viewer.
     pub(crate) fn kept_region(&self) -> Region {
         self.keep.region(self.chunk_region(), self.chunk_cells)
     }
 
-    /// The same terrain with its source looked up, where that goes by name.
+    /// Resolves a named source; the other settings stay the same.
     ///
     /// # Errors
-    /// [`TerrainError::Source`].
+    /// [`TerrainError::Source`] if no source of that name is registered.
     fn resolved(&self, sources: &TerrainSources) -> Result<Self, TerrainError> {
         Ok(Self { source: self.source.resolved(sources)?, ..self.clone() })
     }
 
-    /// What its samples are before anyone edits them.
+    /// The settings that determine the samples before any edit.
     pub(crate) fn recipe(&self) -> SamplingSettings {
         SamplingSettings {
             source: self.source.get().clone(),
@@ -216,14 +215,14 @@ impl Terrain {
         }
     }
 
-    /// Whether its samples, before any edit, are those of another one.
+    /// Whether both terrains have the same samples before any edit.
     fn has_samples_of(&self, other: &Self) -> bool {
         self.recipe().has_samples_of(&other.recipe())
     }
 
-    /// Takes the settings of another one that ask for no other samples.
+    /// Copies the settings of `other` that do not change the samples.
     fn take_all_but_samples(&mut self, other: &Self) {
-        // Both are in chunks, and have been checked with those of the other one.
+        // Both are in chunks: they were checked with the chunk size of `other`.
         if self.chunk_cells == other.chunk_cells {
             (self.extent, self.keep) = (other.extent, other.keep);
         }
@@ -239,13 +238,13 @@ impl Default for Terrain {
     }
 }
 
-/// Why a terrain's settings are refused. On the terrain's entity while that is so.
+/// The reason why a terrain's settings are refused. The terrain's entity has this component while they are.
 #[derive(Component, Reflect, Clone, Debug, PartialEq, Error)]
 #[reflect(Component, Debug, PartialEq, Clone)]
 #[component(clone_behavior = Ignore)]
 #[non_exhaustive]
 pub enum TerrainError {
-    /// No chunk.
+    /// The extent holds no chunk.
     #[error("a terrain's extent must hold at least one chunk that can be addressed, but it is {min} to {max}")]
     Extent {
         /// Its lowest chunk.
@@ -253,34 +252,34 @@ pub enum TerrainError {
         /// One past its highest chunk.
         max: IVec3,
     },
-    /// Too many chunks at once.
+    /// More chunks are kept loaded than allowed.
     #[error(
         "a terrain must keep at most {} chunks loaded, but `keep` and `extent` ask for {found}; keep fewer and let viewers load the others",
         Terrain::MAX_CHUNKS
     )]
     Keep {
-        /// How many that would be.
+        /// The number of chunks that `keep` and `extent` ask for.
         found: u64,
     },
-    /// Chunks too small or too large.
+    /// The number of cells per axis is out of range.
     #[error("a chunk must have 8 to 62 cells per axis, but `chunk_cells` is {found}")]
     ChunkCells {
         /// What was given.
         found: u32,
     },
-    /// Voxels of no size.
+    /// The voxel size is not finite or not above 0.
     #[error("a terrain's voxel size must be finite and above 0, but it is {found}")]
     VoxelSize {
         /// What was given, in world units.
         found: f32,
     },
-    /// A source by a name that the game has not registered.
+    /// The game has registered no source of this name.
     #[error("a terrain's source must be registered in `TerrainSources`, but there is none of the name '{name}'")]
     Source {
         /// Its name.
         name: String,
     },
-    /// NaN or infinite.
+    /// The isovalue is NaN or infinite.
     #[error("a terrain's isovalue must be finite, but it is {found}")]
     Isovalue {
         /// What was given, in voxels.
@@ -288,17 +287,17 @@ pub enum TerrainError {
     },
 }
 
-/// The colours of materials, in order of their numbers. With fewer than 256 they repeat; with none, all is white.
+/// The colours of materials, by material number. With fewer than 256 they repeat; with none, everything is white.
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[reflect(Default, Debug, PartialEq, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Palette {
-    /// One a material.
+    /// One colour per material.
     pub colors: Vec<Color>,
 }
 
 impl Palette {
-    /// A palette of `colors`.
+    /// Creates a palette of `colors`.
     pub fn new<C: Into<Color>>(colors: impl IntoIterator<Item = C>) -> Self {
         Self { colors: colors.into_iter().map(Into::into).collect() }
     }
@@ -311,7 +310,7 @@ impl Palette {
         }
     }
 
-    /// The colours of all materials, as vertices have them.
+    /// The linear colours of all materials, in the format of vertex attributes.
     pub(crate) fn to_vertex_colors(&self) -> [[f32; 4]; 256] {
         core::array::from_fn(|material| LinearRgba::from(self.color(material as u8)).to_f32_array())
     }
@@ -336,7 +335,7 @@ impl Default for Palette {
     }
 }
 
-/// Gives all terrains a component of the plugin's, those that are there already, too.
+/// Adds component `C` to all terrains, both existing and future ones.
 pub(crate) fn give_to_terrains<C: Component + Default>(app: &mut App) {
     let world = app.world_mut();
     let there: Vec<Entity> = world.query_filtered::<Entity, With<TerrainVolume>>().iter(world).collect();
@@ -348,7 +347,7 @@ pub(crate) fn give_to_terrains<C: Component + Default>(app: &mut App) {
     });
 }
 
-/// Keeps terrains' volumes, and follows their settings.
+/// Creates terrains' volumes and applies changes of their settings.
 #[derive(Default)]
 pub struct TerrainPlugin;
 
