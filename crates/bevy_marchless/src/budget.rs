@@ -5,31 +5,31 @@ use core::time::Duration;
 use bevy_ecs::prelude::*;
 use bevy_platform::time::Instant;
 
-/// The main thread's time in one update, and what of it has been spent.
+/// The main thread's time in one update, and how much of it is spent.
 #[derive(Resource, Debug, Default)]
 pub(crate) struct FrameBudget {
     limit: Duration,
     spent: Duration,
-    /// Apart from that: edits take what they need.
+    /// The time spent on edits, which is not limited and not part of `spent`.
     edits: Duration,
-    /// Whether new edits have this update for themselves, and for how many updates streaming has not been held back.
+    /// Whether streaming holds back for new edits in this update.
     yields: bool,
     since_yielded: u32,
 }
 
-/// A kind of work, by what it may spend of the update's time together with all that came before it.
+/// A kind of streaming work, with its share of the update's time. A share includes the time of the kinds before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Share {
     /// Loading and unloading chunks.
     Follow,
-    /// Taking sampled chunks in.
+    /// Taking sampled chunks into the volumes.
     Fill,
-    /// Showing meshes, and starting new ones. Those of edits do not ask.
+    /// Showing meshes and starting new ones. Meshes of edits are exempt.
     Mesh,
 }
 
 impl Share {
-    /// The part of the update's time. Half of it is left for what follows loading, a quarter for what follows filling.
+    /// The share of `limit`. Loading leaves half of it to later work, filling a quarter.
     const fn of(self, limit: Duration) -> Duration {
         match self {
             Self::Follow => limit.checked_div(2).expect("not by zero"),
@@ -39,15 +39,15 @@ impl Share {
     }
 }
 
-/// What streaming has of its time where it holds back for new edits.
+/// Divides streaming's time in an update that holds back for new edits.
 const HELD_BACK: u32 = 4;
-/// Streaming holds back in one of this many updates at most, so that edits in every update do not stop it.
+/// Streaming holds back in at most one of this many updates, so that edits in every update do not stop it.
 const EVERY: u32 = 5;
-/// About how long it takes to spawn or despawn a chunk's entity, which commands do later.
+/// The approximate time to spawn or despawn a chunk's entity, which commands do later.
 pub(crate) const ENTITY_TIME: Duration = Duration::from_micros(10);
 
 impl FrameBudget {
-    /// Begins an update. `edits`: whether new edits are to be applied.
+    /// Begins an update. `edits`: whether it has new edits to apply.
     pub(crate) fn begin(&mut self, limit: Duration, edits: bool) {
         self.since_yielded = self.since_yielded.saturating_add(1);
         self.yields = edits && self.since_yielded >= EVERY;
@@ -57,7 +57,7 @@ impl FrameBudget {
         (self.limit, self.spent, self.edits) = (limit, Duration::ZERO, Duration::ZERO);
     }
 
-    /// Until when a system that has begun at `start` may go on with a kind of work.
+    /// The deadline of a kind of work, for a system that began at `start`.
     pub(crate) fn until(&self, start: Instant, share: Share) -> Instant {
         let part = share.of(self.limit);
         let part = if self.yields { part / HELD_BACK } else { part };
@@ -65,17 +65,17 @@ impl FrameBudget {
         start.checked_add(left).unwrap_or_else(|| start + Duration::from_secs(3_600))
     }
 
-    /// Notes that a system that has begun at `start` is done.
+    /// Adds the time since `start` to the time spent.
     pub(crate) fn spend(&mut self, start: Instant) {
         self.spent += start.elapsed();
     }
 
-    /// Notes that edits have taken so long.
+    /// Adds `time` to the time spent on edits.
     pub(crate) fn spend_on_edits(&mut self, time: Duration) {
         self.edits += time;
     }
 
-    /// What the update's systems have taken so far.
+    /// The time that the update's systems have taken so far, edits included.
     pub(crate) fn spent(&self) -> Duration {
         self.spent + self.edits
     }

@@ -1,4 +1,4 @@
-//! [`Chunk`] and [`ChunkGeometry`]: the entities that mirror what is drawn of a terrain, its children.
+//! [`Chunk`] and [`ChunkGeometry`]: components of the child entities that mirror what is drawn of a terrain.
 
 use core::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -11,28 +11,29 @@ use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
 use marchless::MeshBuffer;
 
-/// One chunk of a terrain, on an entity of its own, a child of the terrain.
+/// One chunk of a terrain, on its own entity, a child of the terrain.
 ///
-/// The plugin spawns these where there is something to draw, and gives each its place, its `Aabb` and its `Mesh3d`.
-/// Samples live in the terrain's [`TerrainVolume`](crate::terrain::TerrainVolume). Despawning one ends its drawing, not its samples.
+/// The plugin spawns chunks where there is something to draw, and gives each its `Transform`, `Aabb` and `Mesh3d`.
+/// Samples live in the terrain's [`TerrainVolume`](crate::terrain::TerrainVolume). Despawning a chunk removes its mesh
+/// from the screen, not its samples.
 ///
-/// Chunks are made, never copied: the plugin despawns those that it has not made, such as those of a cloned terrain, which
-/// makes its own, or those that were written with a scene.
+/// Only the plugin creates chunks. It despawns foreign ones, such as the copies under a cloned terrain, which spawns
+/// its own, and those that came with a scene.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Component, Debug, PartialEq, Hash, Clone)]
 #[component(immutable)]
 #[require(ChunkGeometry, Transform, Visibility, NoAutoAabb)]
 pub struct Chunk {
-    /// The terrain it belongs to.
+    /// The terrain's entity.
     #[entities]
     pub terrain: Entity,
-    /// The level of detail that it is drawn in; 0 is the finest, and at present there is no other.
+    /// The chunk's level of detail; 0 is the finest, and currently the only one.
     pub level: u8,
-    /// Its place in the terrain, in chunks of its level; may be negative.
+    /// The chunk's position in the terrain, in chunks of its level; may be negative.
     pub position: IVec3,
 }
 
-/// Which chunk of which level.
+/// The level and position of a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ChunkKey {
     pub(crate) level: u8,
@@ -40,7 +41,8 @@ pub(crate) struct ChunkKey {
 }
 
 impl Hash for ChunkKey {
-    /// Two words: keys are looked up in every update, and parts of a byte or four take hashers as long as a word.
+    /// Writes two words. Keys are looked up in every update, and hashers need as long for a part of one or four bytes
+    /// as for a word.
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
         let [x, y, z] = self.position.map(|v| u64::from(v.cast_unsigned()));
@@ -50,12 +52,12 @@ impl Hash for ChunkKey {
 }
 
 impl ChunkKey {
-    /// A chunk of the finest level.
+    /// The key of a chunk of the finest level.
     pub(crate) const fn finest(position: [i32; 3]) -> Self {
         Self { level: 0, position }
     }
 
-    /// The 3 × 3 × 3 chunks around it, itself included, of the same level.
+    /// The 3 × 3 × 3 chunks of the same level around the chunk, itself included.
     pub(crate) fn around(self) -> impl Iterator<Item = Self> {
         let Self { level, position: [x, y, z] } = self;
         let near = |v: i32, step: i32| v.saturating_add(step - 1);
@@ -66,19 +68,20 @@ impl ChunkKey {
     }
 }
 
-/// What a chunk looks like at the moment: the mesh in voxels from the chunk's lowest corner, without any renderer.
+/// The mesh of a chunk as shown now, in voxels from the chunk's lowest corner. It exists without a renderer.
 ///
-/// Empty where nothing is left to draw: all was dug away. The same entity's `Mesh3d` holds the same mesh, where there are `Assets<Mesh>`.
+/// Empty if nothing is left to draw, because everything was dug away. Where `Assets<Mesh>` exists, the entity's
+/// `Mesh3d` holds the same mesh.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Debug, Clone)]
 #[component(immutable)]
 pub struct ChunkGeometry {
-    /// The mesh; replaced, never changed.
+    /// The mesh; replaced as a whole, never modified.
     #[reflect(ignore)]
     pub mesh: Arc<MeshBuffer>,
 }
 
-/// The bundle of a chunk without its mesh.
+/// The bundle of a new chunk, without its mesh.
 pub(crate) fn new_chunk(
     terrain: Entity,
     ChunkKey { level, position }: ChunkKey,
@@ -92,18 +95,18 @@ pub(crate) fn new_chunk(
     )
 }
 
-/// From a chunk's own space, in voxels, to the terrain's.
+/// The transform from a chunk's own space, in voxels, to the terrain's.
 pub(crate) fn chunk_transform(position: [i32; 3], cells: u32, voxel_size: f32) -> Transform {
     let corner = IVec3::from(position).as_dvec3() * f64::from(cells) * f64::from(voxel_size);
     Transform::from_translation(corner.as_vec3()).with_scale(Vec3::splat(voxel_size))
 }
 
-/// The box of a whole chunk, in voxels.
+/// The bounding box of a whole chunk, in voxels.
 pub(crate) fn chunk_bounds(cells: [u32; 3]) -> Aabb {
     Aabb::from_min_max(Vec3::ZERO, UVec3::from(cells).as_vec3())
 }
 
-/// The box of a mesh, in voxels; that of the whole chunk where it is empty.
+/// The bounding box of a mesh, in voxels; the whole chunk's box for an empty mesh.
 pub(crate) fn mesh_bounds(mesh: &MeshBuffer, cells: [u32; 3]) -> Aabb {
     match mesh.bounds {
         Some([min, max]) => Aabb::from_min_max(min.into(), max.into()),

@@ -1,7 +1,7 @@
-//! [`WorkQueue`]: one queue of jobs in order of priority, worked off by at most as many tasks as their pool has threads.
+//! [`WorkQueue`]: one queue of jobs by priority, processed by at most as many tasks as the pool has threads.
 //!
-//! Bevy's task pools know no priorities, and a task for each job would stand sampling before an edit. So few tasks take
-//! their jobs from here, the most urgent first, and let other users of the pool in between two jobs.
+//! Bevy's task pools have no priorities: with one task per job, sampling would delay edits. Instead, a few tasks take
+//! jobs from this queue, the most urgent first. Between two jobs they yield to other users of the pool.
 
 use core::cmp::{Ordering, Reverse};
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -13,12 +13,12 @@ use bevy_ecs::prelude::*;
 use bevy_platform::sync::atomic::AtomicU64;
 use bevy_tasks::{AsyncComputeTaskPool, futures_lite::future::yield_now};
 
-/// What comes first, and within one kind, the lowest number.
+/// The priority of a job: the kind in this order, then the lowest number first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Priority {
-    /// Meshing what has changed.
+    /// Meshing edited chunks.
     Edit,
-    /// Meshing what new settings change.
+    /// Meshing chunks again for new settings.
     Restyle,
     /// Meshing a chunk for the first time.
     FirstMesh(u32),
@@ -26,7 +26,7 @@ pub(crate) enum Priority {
     Fill(u32),
 }
 
-/// All jobs that wait for a thread. Dropping it drops them.
+/// The jobs that wait for a thread. Dropping the queue drops them.
 #[derive(Resource, Default)]
 pub(crate) struct WorkQueue(Arc<Shared>);
 
@@ -48,12 +48,12 @@ struct Job {
     run: Box<dyn FnOnce() + Send>,
 }
 
-/// The right to a job's result. Dropping it withdraws a job that has not begun.
+/// A claim on a job's result. Dropping it withdraws the job unless the job has begun.
 #[derive(Debug)]
 pub(crate) struct Ticket(Arc<AtomicBool>);
 
 impl Ticket {
-    /// Withdraws the job, and tells whether that was in time: `false` means that it has begun.
+    /// Withdraws the job. Returns `false` if the job has already begun.
     pub(crate) fn withdraw(&self) -> bool {
         !self.0.swap(true, Relaxed)
     }
@@ -66,7 +66,7 @@ impl Drop for Ticket {
 }
 
 impl WorkQueue {
-    /// Adds a job, which starts at the next [`start`](Self::start) at the earliest.
+    /// Adds a job; it runs after the next [`start`](Self::start) at the earliest.
     pub(crate) fn push(&self, priority: Priority, run: impl FnOnce() + Send + 'static) -> Ticket {
         let claimed = Arc::new(AtomicBool::new(false));
         let mut state = self.0.lock();
@@ -76,7 +76,8 @@ impl WorkQueue {
         Ticket(claimed)
     }
 
-    /// Starts tasks for the jobs that wait or, without threads, does this many at once, 8 if that is not said.
+    /// Starts tasks for pending jobs. With a budget, or without a task pool, runs jobs at once instead: as many as the
+    /// budget says, by default 8.
     pub(crate) fn start(&self, budget: Option<usize>) {
         match (budget, AsyncComputeTaskPool::try_get()) {
             (None, Some(pool)) => {
@@ -109,12 +110,12 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes the most urgent job that has not been withdrawn.
+    /// Takes the most urgent job that is not withdrawn.
     fn take(&self) -> Option<Box<dyn FnOnce() + Send>> {
         take(&mut self.lock())
     }
 
-    /// Takes a job as [`Shared::take`] does, or signs the worker off.
+    /// Takes a job like [`Shared::take`], or counts the worker out if there is none.
     fn take_or_leave(&self) -> Option<Box<dyn FnOnce() + Send>> {
         let mut state = self.lock();
         let job = take(&mut state);
@@ -134,7 +135,7 @@ fn take(state: &mut State) -> Option<Box<dyn FnOnce() + Send>> {
     None
 }
 
-/// Runs a job. Jobs report their own failures; a panic that escapes one must not take a worker with it.
+/// Runs a job. Jobs report their own failures; a panic that escapes must not take the worker with it.
 fn run(job: Box<dyn FnOnce() + Send>) {
     if catch_unwind(AssertUnwindSafe(job)).is_err() {
         bevy_log::error!("a terrain job panicked; its result is lost");
@@ -148,7 +149,7 @@ async fn work(shared: Arc<Shared>) {
     }
 }
 
-/// Does the most urgent job here and now; `false` where none waits.
+/// Runs the most urgent job on this thread; `false` if the queue is empty.
 pub(crate) fn do_next(queue: &WorkQueue) -> bool {
     let job = queue.0.take();
     let found = job.is_some();
@@ -162,7 +163,7 @@ pub(crate) fn new_number() -> u64 {
     LAST.fetch_add(1, Relaxed) + 1
 }
 
-/// Where the jobs of one terrain leave what they made. What nobody takes waits, as long as the terrain is there.
+/// The finished results of one terrain's jobs. They wait here until taken or until the terrain is dropped.
 pub(crate) struct Results<T>(Arc<Mutex<Vec<T>>>);
 
 impl<T> Results<T> {
@@ -174,7 +175,7 @@ impl<T> Results<T> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
     }
 
-    /// All results since the last time, in the order in which they were made.
+    /// Takes all results since the last call, in the order in which they were made.
     pub(crate) fn take(&self) -> Vec<T> {
         core::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }

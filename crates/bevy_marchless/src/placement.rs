@@ -1,10 +1,10 @@
-//! [`Placement`]: where terrains are in world space, in double precision.
+//! [`Placement`]: the transforms of terrains in world space, in double precision.
 
 use bevy_ecs::query::QueryData;
 use bevy_math::DAffine3;
 use bevy_transform::components::GlobalTransform;
 
-/// Where a terrain was in world space when transforms were last propagated.
+/// A terrain's transform in world space, as of the last propagation of transforms.
 #[derive(QueryData)]
 pub(crate) struct Placement {
     transform: &'static GlobalTransform,
@@ -13,8 +13,8 @@ pub(crate) struct Placement {
 }
 
 impl PlacementItem<'_, '_> {
-    /// Whether it is exact however far from the origin: then world space is relative to a floating origin, and only
-    /// propagated transforms can be compared with it.
+    /// Whether the terrain is in a `big_space` grid. World space is then relative to a floating origin and exact at any
+    /// distance; only propagated transforms are comparable with it.
     pub(crate) fn is_floating(&self) -> bool {
         #[cfg(feature = "big_space")]
         return self.grid.is_some();
@@ -22,7 +22,8 @@ impl PlacementItem<'_, '_> {
         false
     }
 
-    /// From the terrain's own space (world units from its lattice's origin, so voxels times the voxel size) to world space.
+    /// Transforms from the terrain's own space to world space. The own space is in world units from the lattice's
+    /// origin: voxels times the voxel size.
     pub(crate) fn to_world(&self) -> DAffine3 {
         #[cfg(feature = "big_space")]
         if let Some(grid) = self.grid {
@@ -31,7 +32,7 @@ impl PlacementItem<'_, '_> {
         in_double_precision(self.transform)
     }
 
-    /// From world space to the terrain's own; not finite where the terrain is scaled to nothing.
+    /// Transforms from world space to the terrain's own; not finite if the terrain's scale is 0.
     pub(crate) fn to_terrain(&self) -> DAffine3 {
         self.to_world().inverse()
     }
@@ -43,7 +44,7 @@ pub(crate) fn in_double_precision(transform: &GlobalTransform) -> DAffine3 {
     DAffine3 { matrix3: affine.matrix3.as_dmat3(), translation: affine.translation.as_dvec3() }
 }
 
-/// From the space of a grid to world space, which is relative to the floating origin's cell.
+/// Transforms from a grid's space to world space, which is relative to the floating origin's cell.
 #[cfg(feature = "big_space")]
 fn grid_to_world(grid: &::big_space::grid::Grid) -> DAffine3 {
     let origin = grid.local_floating_origin();

@@ -1,4 +1,5 @@
-//! [`MarchlessSystems`]: what the plugin does in an update, in order, and [`MarchlessSettings`], how much of it at once.
+//! [`MarchlessSystems`]: the order of the plugin's systems in an update. [`MarchlessSettings`]: how much work one
+//! update does.
 
 use core::time::Duration;
 
@@ -12,11 +13,11 @@ use crate::budget::FrameBudget;
 use crate::jobs::WorkQueue;
 use crate::stats::{TerrainStats, count_main_thread, count_update};
 
-/// The plugin's systems. All of them run in [`PostUpdate`], before transforms are propagated and asset events are
-/// sent, so that what is written in `Update` shows in the same frame.
+/// The system sets of the plugin. All run in [`PostUpdate`], before transforms are propagated and asset events are
+/// sent, so changes made in `Update` show in the same frame.
 ///
-/// To pause terrain, give [`MarchlessSystems::Work`] a run condition. [`MarchlessSystems::ReadStamps`] should go on
-/// running, because messages that nobody reads are dropped; the stamps then wait in a queue, in order.
+/// To pause terrain, give [`MarchlessSystems::Work`] a run condition. Keep [`MarchlessSystems::ReadStamps`] running,
+/// because Bevy drops unread messages; the stamps then wait in a queue, in order.
 ///
 /// ```
 /// # use bevy_app::{App, PostUpdate};
@@ -33,62 +34,64 @@ use crate::stats::{TerrainStats, count_main_thread, count_update};
 pub enum MarchlessSystems {
     /// Reads [`Stamp`](crate::brush::Stamp) messages into a queue.
     ReadStamps,
-    /// All else, and the set that a run condition may pause. [`TerrainEdited`](crate::brush::TerrainEdited) messages are
-    /// written in it, and meshes shown.
+    /// All other work; a run condition may pause this set. It writes [`TerrainEdited`](crate::brush::TerrainEdited)
+    /// messages and shows meshes.
     Work,
-    /// In `Work`, once the update's new chunks are there: the place for what adds to them, so that it is there before they
-    /// are first drawn; see module [`inherit`](crate::inherit).
+    /// Part of `Work`, after the update's new chunks are spawned. Systems that add components to chunks belong here, so
+    /// that the components are present when the chunks are first drawn; see module [`inherit`](crate::inherit).
     Decorate,
 }
 
-/// What the plugin does in [`MarchlessSystems::Work`], in order.
+/// The phases of [`MarchlessSystems::Work`], in order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum UpdatePhase {
-    /// Gives new terrains their volume, and follows changes of their settings.
+    /// Gives new terrains their volume and applies changes of settings.
     Prepare,
-    /// Lets chunks come and go.
+    /// Loads and unloads chunks.
     Load,
-    /// Takes sampled chunks into the volumes and asks for more.
+    /// Takes sampled chunks into the volumes and queues sampling jobs.
     Fill,
     /// Applies stamps to the samples.
     Edit,
-    /// Meshes groups of changed chunks and shows those that are complete.
+    /// Meshes groups of changed chunks and shows complete groups.
     Mesh,
-    /// Has threads begin what has been asked for.
+    /// Starts tasks for queued jobs.
     StartJobs,
-    /// Measures.
+    /// Updates the statistics.
     Report,
 }
 
-/// Somebody makes meshes of chunks: else they do not wait for them.
+/// Present if a plugin meshes chunks; without it, chunks do not wait for meshes.
 #[derive(Resource, Default)]
 pub(crate) struct MakesMeshes;
 
-/// How the plugin shares out its work; the defaults fit most games.
+/// Limits on the plugin's work per update; the defaults fit most games.
 #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Resource, Default, Debug, PartialEq, Clone)]
 pub struct MarchlessSettings {
-    /// A group of at most this many chunks is meshed within the update that changed it; a larger one in tasks, to be
-    /// shown updates later. Groups of 1,024 chunks in all are meshed within one update at most.
-    /// Unit: chunks with a surface. Default 8: what a small stamp at a corner of chunks touches.
+    /// A group of at most this many chunks is meshed within the update that changed it. Tasks mesh larger groups, which
+    /// are shown some updates later. One update meshes groups of at most 1,024 chunks in all, or of this many if it is
+    /// larger. Unit: chunks with a surface. Default 8: a small stamp at a corner of chunks touches this many.
     pub max_inline_chunks: usize,
-    /// How many chunks may be on their way through the jobs that sample and mesh them for the first time, for each thread
-    /// of the pool: few, so that what is seen first comes first; enough for an update. At least 1. Default 64.
+    /// The most chunks in the jobs that sample chunks and mesh them for the first time, per thread of the pool. A low
+    /// value keeps visible chunks first; a high value keeps threads busy for a whole update. At least 1. Default 64.
     pub max_chunks_in_flight: usize,
-    /// So many bytes of new meshes are shown per update, and one chunk more, so that the graphics card is not flooded;
-    /// edits are shown at once whatever their size. Default 4 MiB.
+    /// New meshes are shown until an update has shown this many bytes, so that uploads do not flood the graphics card;
+    /// the last chunk may exceed the limit. Edits are shown at once, whatever their size. Default 4 MiB.
     pub max_upload_bytes: usize,
-    /// How long the main thread may load and unload chunks per update; what is left waits. Each update does some. Edits take
-    /// what they need beside it; streaming holds back for them in one of five updates at most. Default: six tenths of a
-    /// millisecond.
+    /// The time per update in which the main thread may load and unload chunks; the rest of the work waits. Each update
+    /// does some of it. Edits are not part of this budget and take the time they need; streaming holds back for them in
+    /// at most one of five updates. Default: 0.6 milliseconds.
     pub streaming_budget: Duration,
-    /// Where the [`Mesh`](bevy_mesh::Mesh) assets of chunks are kept; counts for meshes made from then on. Default:
-    /// `RENDER_WORLD` alone, which frees the main world's copy once it has been uploaded. With `MAIN_WORLD` too, mesh ray casts,
-    /// picking and other crates' colliders can read them, at the cost of that memory. Without `RENDER_WORLD`, nothing is drawn.
+    /// The worlds that keep the [`Mesh`](bevy_mesh::Mesh) assets of chunks; applies to meshes made after a change.
+    /// Default: `RENDER_WORLD` alone, which frees the main world's copy after its upload. With `MAIN_WORLD` too, mesh
+    /// ray casts, picking and other crates' colliders can read the meshes, at the cost of that memory. Without
+    /// `RENDER_WORLD`, nothing is drawn.
     pub mesh_usages: RenderAssetUsages,
-    /// Without threads: how many chunks may be sampled or meshed per update, on the main thread; `Some(0)` lets them all
-    /// wait, and only what `max_inline_chunks` allows is meshed. `None`: in tasks,
-    /// as many at once as the pool of asynchronous tasks has threads. Default: 8 on the web, `None` elsewhere; also 8 where there is no such pool.
+    /// The most chunks that the main thread samples or meshes per update, for platforms without threads. With `Some(0)`
+    /// they all wait, and only groups within `max_inline_chunks` are meshed. With `None`, tasks do this work, at most
+    /// as many at once as the pool of asynchronous tasks has threads. Default: 8 on the web, `None` elsewhere; without
+    /// such a pool, `None` acts as 8.
     pub max_jobs_per_update: Option<usize>,
 }
 
@@ -106,7 +109,8 @@ impl Default for MarchlessSettings {
 }
 
 impl MarchlessSettings {
-    /// How many chunks of a terrain may be sampled, and how many meshed without an edit, at once.
+    /// The most chunks of a terrain that may be sampled at once, and the most that may be meshed without an edit at
+    /// once.
     pub(crate) fn in_flight(&self, threads: usize) -> usize {
         self.max_chunks_in_flight.max(1).saturating_mul(if self.max_jobs_per_update.is_some() { 1 } else { threads })
     }
@@ -142,16 +146,16 @@ impl Plugin for SchedulePlugin {
     }
 }
 
-/// Begins the update's time.
+/// Begins the update's time budget.
 fn begin_update(settings: Res<MarchlessSettings>, edits: Option<Res<NewEdits>>, mut budget: ResMut<FrameBudget>) {
     budget.begin(settings.streaming_budget, edits.is_some_and(|edits| edits.0));
 }
 
-/// Has threads begin what has been asked for or, without threads, does a part of it.
+/// Starts tasks for queued jobs; without threads, runs some of the jobs.
 fn start_jobs(queue: Res<WorkQueue>, settings: Res<MarchlessSettings>) {
     queue.start(settings.max_jobs_per_update);
 }
 
-/// Whether stamps are to be applied in this update, for which streaming holds back.
+/// Whether this update has new stamps to apply; streaming holds back for them.
 #[derive(Resource, Default)]
 pub(crate) struct NewEdits(pub(crate) bool);

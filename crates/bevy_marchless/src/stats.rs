@@ -1,4 +1,4 @@
-//! [`TerrainStats`]: what the plugin has done, in all. Each figure is counted in one place.
+//! [`TerrainStats`]: totals of the plugin's work. Each figure is counted in one place.
 
 use core::time::Duration;
 
@@ -8,53 +8,53 @@ use bevy_reflect::prelude::*;
 
 use crate::budget::FrameBudget;
 
-/// What the plugin has done for all terrains since the start.
+/// Totals of the plugin's work for all terrains since the start.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default, Debug, PartialEq, Clone)]
 pub struct TerrainStats {
-    /// Updates, paused ones included.
+    /// Number of updates, including paused ones.
     pub updates: u64,
-    /// Chunks that came into range, their surroundings included.
+    /// Chunks loaded, including those that only serve as surroundings of others.
     pub loaded: u64,
-    /// Chunks that went out of range.
+    /// Chunks unloaded.
     pub unloaded: u64,
-    /// Chunks that the source's bound settled, so that they needed no job.
+    /// Chunks whose samples followed from the source's bound, without a job.
     pub bounded: u64,
-    /// Chunks that took sampling.
+    /// Chunks sampled by jobs.
     pub filled: u64,
-    /// Those of them that proved empty: all of their own samples lie on one side of the surface.
+    /// Sampled chunks that proved empty: all of their own samples lie on one side of the surface.
     pub filled_empty: u64,
-    /// Chunks that were meshed, again after edits included; not those that are known to have no surface.
+    /// Chunks meshed, including repeats after edits. Chunks known to have no surface do not count.
     pub meshed: u64,
-    /// How long jobs have sampled and bounded, in all.
+    /// Total time that jobs spent on sampling and bounds.
     pub fill_time: Duration,
-    /// How long chunks were meshed, in all.
+    /// Total time spent on meshing chunks.
     pub mesh_time: Duration,
-    /// Edits that have been shown; those that were shown together count once.
+    /// Edits shown; edits shown together count once.
     pub edits_shown: u64,
-    /// How many updates after the one that read its stamp the latest edit was shown; 0 is the same one.
+    /// Number of updates from reading the latest shown edit's stamp to showing it; 0 means the same update.
     pub edit_updates_last: u64,
-    /// How long after its stamp was read the latest edit was shown.
+    /// Time from reading the latest shown edit's stamp to showing it.
     pub edit_time_last: Duration,
-    /// How long the plugin's systems have taken, in all; waiting for edits' meshes included.
+    /// Total time of the plugin's systems, including waits for edits' meshes.
     pub main_thread: Duration,
-    /// How long they took in the latest update.
+    /// Time of the plugin's systems in the latest update.
     pub main_thread_last: Duration,
 }
 
 impl TerrainStats {
-    /// This moment.
+    /// The current update and time.
     pub(crate) fn now(&self) -> RequestTime {
         RequestTime { update: self.updates, time: Instant::now() }
     }
 
-    /// Notes that a chunk has been meshed.
+    /// Counts a meshed chunk and its time.
     pub(crate) fn count_mesh(&mut self, time: Duration) {
         self.meshed += 1;
         self.mesh_time += time;
     }
 
-    /// Notes that an edit asked for at `since` is visible.
+    /// Counts a shown edit whose stamp was read at `since`.
     pub(crate) fn count_edit_shown(&mut self, since: RequestTime) {
         self.edits_shown += 1;
         self.edit_updates_last = self.updates - since.update;
@@ -62,7 +62,7 @@ impl TerrainStats {
     }
 }
 
-/// When something was asked for.
+/// The update and time of a request.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RequestTime {
     update: u64,
@@ -82,7 +82,7 @@ pub(crate) fn count_update(mut stats: ResMut<TerrainStats>) {
     stats.updates += 1;
 }
 
-/// Adds up what the update's systems have taken.
+/// Adds the time of the update's systems to the statistics.
 pub(crate) fn count_main_thread(budget: Res<FrameBudget>, mut stats: ResMut<TerrainStats>) {
     stats.main_thread += budget.spent();
     stats.main_thread_last = budget.spent();
