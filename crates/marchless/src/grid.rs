@@ -1,4 +1,4 @@
-//! [`Grid`]: a sparse volume of chunks, each uniform or samples that are copied on write.
+//! [`Grid`]: a sparse volume of chunks. A chunk is one uniform voxel, or samples that are copied on write.
 
 mod block;
 pub(crate) mod border;
@@ -26,25 +26,26 @@ use crate::mesher::{MeshError, MeshSettings, Mesher};
 use crate::sample::{Voxel, Weight};
 use crate::source::Source;
 
-/// Cells per axis of a chunk where nothing else is asked for.
+/// The default number of cells per axis of a chunk.
 pub const DEFAULT_CHUNK_CELLS: u32 = 32;
-/// The fewest cells per axis that a chunk may have.
+/// The smallest number of cells per axis of a chunk.
 pub const MIN_CHUNK_CELLS: u32 = 8;
-/// The most cells per axis that a chunk may have.
+/// The largest number of cells per axis of a chunk.
 pub const MAX_CHUNK_CELLS: u32 = 62;
 
-/// Up to so many chunk positions are marked dirty without a look at which of them hold a chunk.
-const MOST_MARKED_ABSENT: u128 = 4096;
+/// The most chunk positions that are all marked dirty, absent chunks included. In larger regions, only present chunks
+/// and their neighbours are marked.
+const MAX_MARKED_ABSENT: u128 = 4096;
 
 /// A sparse volume of samples in chunks of `n` cells per axis: the chunk at `c` owns the lattice points
 /// `c·n` to `c·n + n − 1` of each axis.
 ///
-/// Cloning shares the samples, and either copy may be edited without affecting the other. The grid remembers which
-/// chunks' meshes an edit has changed, until [`Grid::take_dirty`].
+/// A clone shares the samples, and editing one copy does not affect the other. An edit marks chunks *dirty* if their
+/// meshes read a changed sample; they stay dirty until [`Grid::take_dirty`].
 ///
-/// A **bounded** grid has air around it, so that its chunks' meshes together are closed: meshes, rays and reports of edits
-/// see its samples intersected with a box half a voxel inside the outermost planes ([`Grid::as_meshed`]). The samples
-/// themselves stay as they were written, so the bounds may change at any time ([`Grid::set_bounds`]).
+/// A **bounded** grid has air around it, so its chunks' meshes together are closed: meshes, rays and reports of edits
+/// see its samples intersected with a box half a voxel inside the outermost planes ([`Grid::as_meshed`]). The stored
+/// samples are not clipped, so the bounds may change at any time ([`Grid::set_bounds`]).
 ///
 /// ```
 /// use marchless::{Grid, Region, Voxel};
@@ -64,7 +65,7 @@ pub struct Grid<W = i16> {
 }
 
 impl<W: Weight> Grid<W> {
-    /// An empty grid without bounds: absent chunks are air. `chunk_cells`: 8 to 62 per axis.
+    /// An empty grid without bounds. Absent chunks are air. `chunk_cells`: 8 to 62 per axis.
     ///
     /// # Errors
     /// [`GridError::ChunkCells`].
@@ -73,23 +74,25 @@ impl<W: Weight> Grid<W> {
         Ok(Self { cells: chunk_cells, bounds: None, chunks: Chunks::new(), dirty: BTreeSet::new() })
     }
 
-    /// An empty grid of the chunks in `chunks`, with air around them.
+    /// An empty grid that is bounded to the chunk positions in `chunks`, with air around them.
     ///
     /// # Errors
-    /// [`GridError::ChunkCells`]; [`GridError::Bounds`] where `chunks` is empty or its lattice points do not fit in
-    /// `i32`.
+    /// [`GridError::ChunkCells`]; [`GridError::Bounds`] if `chunks` is empty or its lattice points do not fit in `i32`.
     pub fn bounded(chunk_cells: u32, chunks: Region) -> Result<Self, GridError> {
         let mut grid = Self::new(chunk_cells)?;
         grid.set_bounds(Some(chunks))?;
         Ok(grid)
     }
 
-    /// Gives the grid other bounds, or none. Chunks beyond them stay in memory, but are not seen, until the bounds hold them
-    /// again. Nothing is marked dirty: what changes are the meshes of chunks at the old border and at the new one, and of
-    /// those that are seen for the first time.
+    /// Sets the bounds, in chunk positions; `None` removes them. Chunks beyond the new bounds stay in memory, but read
+    /// as air until bounds include them again.
+    ///
+    /// This marks no chunk dirty. The meshes that change are those of chunks at the old border, at the new border, and
+    /// of chunks that were beyond the old bounds.
     ///
     /// # Errors
-    /// [`GridError::Bounds`] where `bounds` is empty or its lattice points do not fit in `i32`; nothing is changed then.
+    /// [`GridError::Bounds`] if `bounds` is empty or its lattice points do not fit in `i32`; the grid is then
+    /// unchanged.
     pub fn set_bounds(&mut self, bounds: Option<Region>) -> Result<(), GridError> {
         let limits = Self::largest(self.cells);
         if let Some(bounds) = bounds.filter(|bounds| bounds.is_empty() || bounds.intersection(&limits) != *bounds) {
@@ -109,7 +112,7 @@ impl<W: Weight> Grid<W> {
         self.bounds
     }
 
-    /// The outermost lattice planes of a bounded grid: points at `min` and at `max` lie on them, both included.
+    /// The outermost lattice planes of a bounded grid. Points at `min` and at `max` both lie on planes.
     pub fn planes(&self) -> Option<Region> {
         let scaled = |v: i32| v * self.cells as i32; // fits: checked by `set_bounds`
         self.bounds.map(|bounds| Region::new(bounds.min.map(scaled), bounds.max.map(scaled)))
@@ -126,7 +129,7 @@ impl<W: Weight> Grid<W> {
         Region::new(min, min.map(|v| v.saturating_add(self.cells as i32)))
     }
 
-    /// The sample at `point`, as it was written. Absent chunks and all beyond the bounds are air.
+    /// The stored sample at `point`, not clipped to the border. Absent chunks and points beyond the bounds are air.
     pub fn get(&self, point: [i32; 3]) -> Voxel<W> {
         let position = self.chunk_of(point);
         match self.seen_chunk(position) {
@@ -135,9 +138,9 @@ impl<W: Weight> Grid<W> {
         }
     }
 
-    /// The sample at `point` as meshes and rays at an isovalue (in voxels) read it: in a bounded grid intersected with
-    /// the box of its border. That lies half a voxel from the surface on the outermost planes, and one voxel more with each
-    /// point farther out.
+    /// The sample at `point` as meshes and rays at an isovalue (in voxels) read it: in a bounded grid, intersected with
+    /// the border's box. On the outermost planes, the box's weight is half a voxel above the isovalue; it grows by one
+    /// voxel with each point farther out.
     pub fn as_meshed(&self, point: [i32; 3], isovalue: f32) -> Voxel<W> {
         match self.border() {
             Some(border) if self.limits().contains(self.chunk_of(point)) => {
@@ -149,10 +152,11 @@ impl<W: Weight> Grid<W> {
         }
     }
 
-    /// Changes the sample at `point` and marks the chunks dirty whose meshes read it.
+    /// Sets the sample at `point` and marks the chunks dirty whose meshes read it. Writing an equal sample does
+    /// nothing.
     ///
     /// # Errors
-    /// [`GridError::OutOfBounds`]; nothing is changed then.
+    /// [`GridError::OutOfBounds`]; the grid is then unchanged.
     pub fn set(&mut self, point: [i32; 3], voxel: Voxel<W>) -> Result<(), GridError> {
         let position = self.chunk_of(point);
         self.check(position)?;
@@ -169,8 +173,8 @@ impl<W: Weight> Grid<W> {
     /// Puts a whole chunk at `position`, and marks it and its neighbours dirty.
     ///
     /// # Errors
-    /// [`GridError::OutOfBounds`], and [`GridError::SamplesLength`] where the chunk is of another size; nothing is
-    /// changed then.
+    /// [`GridError::OutOfBounds`]; [`GridError::SamplesLength`] if the chunk's size is not the grid's. The grid is then
+    /// unchanged.
     pub fn insert(&mut self, position: [i32; 3], chunk: GridChunk<W>) -> Result<(), GridError> {
         self.check(position)?;
         self.insert_clean(position, chunk)?;
@@ -178,11 +182,12 @@ impl<W: Weight> Grid<W> {
         Ok(())
     }
 
-    /// Puts a chunk at `position` and marks nothing dirty: for a chunk of which, with its neighbours, no mesh is out of
-    /// date. Beyond the bounds it is kept, and not seen.
+    /// Puts a whole chunk at `position` and marks nothing dirty. Use it where neither the chunk nor its neighbours have
+    /// a mesh that is now out of date. A chunk beyond the bounds is kept, but reads as air.
     ///
     /// # Errors
-    /// [`GridError::SamplesLength`], and [`GridError::OutOfBounds`] where there is no place for a chunk in any grid.
+    /// [`GridError::SamplesLength`] if the chunk's size is not the grid's; [`GridError::OutOfBounds`] if `position` is
+    /// outside of [`Grid::largest`].
     pub fn insert_clean(&mut self, position: [i32; 3], chunk: GridChunk<W>) -> Result<(), GridError> {
         chunk.check(self.cells)?;
         let bounds = Self::largest(self.cells);
@@ -193,7 +198,7 @@ impl<W: Weight> Grid<W> {
         Ok(())
     }
 
-    /// Takes the chunk at `position` out and marks nothing dirty.
+    /// Removes and returns the chunk at `position`, and marks nothing dirty.
     pub fn remove_clean(&mut self, position: [i32; 3]) -> Option<GridChunk<W>> {
         self.chunks.remove(position)
     }
@@ -213,13 +218,13 @@ impl<W: Weight> Grid<W> {
     /// ```
     ///
     /// # Errors
-    /// [`GridError::OutOfBounds`]; nothing is sampled then.
+    /// [`GridError::OutOfBounds`]; the source is then not sampled.
     pub fn fill(&mut self, position: [i32; 3], source: &(impl Source + ?Sized), spacing: f64) -> Result<(), GridError> {
         self.check(position)?;
         self.insert(position, GridChunk::from_source(source, position, self.cells, spacing))
     }
 
-    /// The chunk at `position`, where there is one; also beyond the bounds.
+    /// The chunk at `position`, also beyond the bounds; `None` if it is absent.
     pub fn chunk(&self, position: [i32; 3]) -> Option<&GridChunk<W>> {
         self.chunks.get(position)
     }
@@ -229,13 +234,15 @@ impl<W: Weight> Grid<W> {
         self.chunks.iter()
     }
 
-    /// The chunks from `position` on, in the order of [`chunks`](Self::chunks): for going through them a part at a time.
+    /// The chunks at or after `position`, in the order of [`chunks`](Self::chunks), so that a caller can visit all
+    /// chunks in portions.
     pub fn chunks_from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.chunks.from(position)
     }
 
-    /// The chunks at the positions within `region`, each once and always in the same order, which is not that of
-    /// [`chunks`](Self::chunks). The cost is in proportion to what is there, whatever the size of the region or the grid.
+    /// The chunks at positions within `region`, each once. The order is always the same, but differs from that of
+    /// [`chunks`](Self::chunks). The cost is proportional to the number of chunks found, not to the size of the region
+    /// or of the grid.
     ///
     /// ```
     /// use marchless::{Grid, GridChunk, Region};
@@ -252,19 +259,19 @@ impl<W: Weight> Grid<W> {
         self.chunks.positions_in(region).filter_map(|position| Some((position, self.chunk(position)?)))
     }
 
-    /// Takes the chunk at `position` out, so that it reads as air, and marks it and its neighbours dirty.
+    /// Removes and returns the chunk at `position`, which then reads as air, and marks it and its neighbours dirty.
     pub fn remove(&mut self, position: [i32; 3]) -> Option<GridChunk<W>> {
         let chunk = self.chunks.remove(position)?;
         self.mark_dirty(self.chunk_region(position));
         Some(chunk)
     }
 
-    /// The chunk at `position` with its neighbours, as they are now: what a task needs to mesh it.
+    /// A snapshot of the chunk at `position` and its neighbours: all that a task needs to mesh it.
     pub fn neighbourhood(&self, position: [i32; 3]) -> Neighbourhood<W> {
         self.neighbourhood_view(position).to_neighbourhood()
     }
 
-    /// The chunk at `position` with its neighbours, in place: what meshing it at once needs.
+    /// The chunk at `position` and its neighbours, borrowed: all that is needed to mesh it at once.
     pub fn neighbourhood_view(&self, position: [i32; 3]) -> NeighbourhoodView<'_, W> {
         let limits = self.limits();
         let step = |index: usize| [index % 3, index / 3 % 3, index / 9];
@@ -275,11 +282,11 @@ impl<W: Weight> Grid<W> {
         };
         let beyond = (0..27).filter(is_beyond).fold(0, |beyond, index| beyond | 1 << index);
         let mut chunks = [None; 27];
-        // Three at a time, since those above each other along z follow each other in the map.
+        // Neighbours along z follow each other in the map, so one range finds three chunks.
         let around = position.map(|v| [v.saturating_sub(1), v, v.saturating_add(1)]);
         for (j, y) in around[1].into_iter().enumerate() {
             for (i, x) in around[0].into_iter().enumerate() {
-                // Looking for one end only is quicker.
+                // A range with one end is quicker than one with two.
                 let column = self.chunks.from([x, y, around[2][0]]);
                 for (neighbour, chunk) in column.take_while(|(neighbour, _)| *neighbour <= [x, y, around[2][2]]) {
                     let k = (neighbour[2] - around[2][0]) as usize;
@@ -306,15 +313,16 @@ impl<W: Weight> Grid<W> {
         affected.intersection(&self.limits())
     }
 
-    /// Marks the chunks dirty whose meshes read a point of `changed`. Absent chunks without a present neighbour have
-    /// no mesh, and may be left out where there are many; the cost is then in proportion to the present chunks there.
+    /// Marks the chunks dirty whose meshes read a point of `changed`. In a large region, absent chunks without a
+    /// present neighbour are left out, since they have no mesh; the cost is then proportional to the number of present
+    /// chunks.
     pub fn mark_dirty(&mut self, changed: Region) {
         let affected = self.chunks_affected_by(changed);
         if affected.is_empty() {
             return;
         }
         let count = affected.size().into_iter().map(u128::from).product::<u128>();
-        if count <= MOST_MARKED_ABSENT {
+        if count <= MAX_MARKED_ABSENT {
             self.dirty.extend(affected.points());
             return;
         }
@@ -329,13 +337,13 @@ impl<W: Weight> Grid<W> {
         &self.dirty
     }
 
-    /// The chunks whose meshes are out of date; from now on, none are.
+    /// Returns the chunks whose meshes are out of date, and clears the set.
     pub fn take_dirty(&mut self) -> BTreeSet<[i32; 3]> {
         core::mem::take(&mut self.dirty)
     }
 
-    /// Meshes the chunk at `position`, in cells from its lowest lattice point. Many chunks are meshed faster by
-    /// [`NeighbourhoodView::mesh`], which reuses its block.
+    /// Meshes the chunk at `position`. Vertex positions are in cells from its lowest lattice point. To mesh many
+    /// chunks, [`NeighbourhoodView::mesh`] is faster, since it reuses its block.
     ///
     /// # Errors
     /// As [`Mesher::mesh`]; `out` is then empty.
@@ -349,24 +357,28 @@ impl<W: Weight> Grid<W> {
         self.neighbourhood_view(position).mesh(mesher, &mut Block::new(), settings, out)
     }
 
-    /// The chunk at `position`, where there is one within the bounds.
+    /// The chunk at `position`; `None` if it is absent or beyond the bounds.
     pub(crate) fn seen_chunk(&self, position: [i32; 3]) -> Option<&GridChunk<W>> {
         let is_seen = self.bounds.is_none_or(|bounds| bounds.contains(position));
         self.chunks.get(position).filter(|_| is_seen)
     }
 
-    /// The chunk at `position`, made of air where it is absent, to be changed by the caller, who marks what has changed.
+    /// The chunk at `position`, to be edited; an absent chunk is first inserted as air. The caller marks changes dirty.
+    ///
+    /// # Errors
+    /// [`GridError::OutOfBounds`].
     pub(crate) fn chunk_mut(&mut self, position: [i32; 3]) -> Result<&mut GridChunk<W>, GridError> {
         self.check(position)?;
         Ok(self.chunks.get_mut_or_air(position))
     }
 
-    /// The chunk at `position`, where there is one, also beyond the bounds, to be changed in the same way.
+    /// The chunk at `position`, to be edited, also beyond the bounds; `None` if it is absent. The caller marks changes
+    /// dirty.
     pub(crate) fn present_chunk_mut(&mut self, position: [i32; 3]) -> Option<&mut GridChunk<W>> {
         self.chunks.get_mut(position)
     }
 
-    /// Which chunk positions hold a chunk.
+    /// The set of chunk positions that hold a chunk.
     pub(crate) const fn occupancy(&self) -> &Occupancy {
         self.chunks.occupancy()
     }
@@ -383,19 +395,21 @@ impl<W: Weight> Grid<W> {
         x + n as usize * (y + n as usize * z)
     }
 
+    /// Checks that the grid may hold a chunk at `position`.
+    ///
     /// # Errors
-    /// [`GridError::OutOfBounds`] where there is no place for a chunk at `position`.
+    /// [`GridError::OutOfBounds`] if `position` is outside of [`Grid::limits`].
     pub(crate) fn check(&self, position: [i32; 3]) -> Result<(), GridError> {
         let bounds = self.limits();
         if bounds.contains(position) { Ok(()) } else { Err(GridError::OutOfBounds { position, bounds }) }
     }
 
-    /// The chunk positions that are seen where there is a chunk: the bounds, or all whose blocks fit in `i32`.
+    /// The chunk positions that meshes and reads see: the bounds, or [`Grid::largest`] in a grid without bounds.
     pub(crate) fn limits(&self) -> Region {
         self.bounds.unwrap_or_else(|| Self::largest(self.cells))
     }
 
-    /// All chunk positions that there can be in a grid: those whose blocks fit in `i32`. `chunk_cells`: 8 to 62, clamped.
+    /// All chunk positions that any grid can have: those whose blocks fit in `i32`. `chunk_cells`: 8 to 62, clamped.
     pub fn largest(chunk_cells: u32) -> Region {
         let end = (i32::MAX - 2) / chunk_cells.clamp(MIN_CHUNK_CELLS, MAX_CHUNK_CELLS) as i32;
         Region::new([-end; 3], [end; 3])

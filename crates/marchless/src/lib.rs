@@ -2,23 +2,23 @@
 //! `no_std` with `alloc`, no engine, no math crate. The plugin for Bevy is `bevy_marchless`.
 //!
 //! # The idea
-//! The sign of a sample is one bit, and a row of samples is a word. Which cells the surface crosses, which edges carry
-//! a vertex and how many there are become word operations over whole rows; only the few cells that the surface
-//! really crosses are ever looked at one by one.
+//! The sign of a sample is one bit, and a row of samples is a word. Word operations over whole rows find the cells that
+//! the surface crosses, and find and count the edges that carry a vertex. Only the few cells that the surface crosses
+//! are visited one by one.
 //!
 //! # Words
 //! | word | meaning |
 //! |---|---|
 //! | sample, [`Voxel`] | a lattice point's `weight`, its signed distance in voxels, **negative inside**, and its `material` |
-//! | cell | the cube between 8 samples; its corners, edges, faces and case index stand in the module [`cell`] |
+//! | cell | the cube between 8 samples; the module [`cell`] defines its corners, edges, faces and case index |
 //! | chunk | the unit that is meshed: 32 cells per axis by default |
-//! | block | the samples that one chunk's mesh is made from: its own, and padding |
-//! | stamp, edit | one application of a brush; what it has changed |
+//! | block | the samples that one chunk's mesh is made from: the chunk's own, and padding |
+//! | stamp, edit | a stamp is one application of a brush; an edit is the change that it made |
 //!
 //! # From samples to a mesh
-//! [`Mesher`] meshes any borrowed [`Samples`] into a reusable [`MeshBuffer`]; [`SlabMesher`] meshes volumes that come
-//! slab by slab and need not fit in memory, and `ThreadedMesher` (feature `std`) large ones on several threads, all
-//! three the same mesh. [`Grid`] keeps a whole volume in chunks that mesh one by one without seams:
+//! [`Mesher`] meshes any borrowed [`Samples`] into a reusable [`MeshBuffer`]. [`SlabMesher`] meshes a volume that
+//! arrives slab by slab and need not fit in memory. `ThreadedMesher` (feature `std`) meshes a large volume on several
+//! threads. All three give the same mesh. [`Grid`] keeps a whole volume in chunks, which mesh one by one without seams:
 //!
 //! ```
 //! use marchless::{Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Operation, QuantisedShape, QuantisedStamp, Region};
@@ -30,7 +30,7 @@
 //! let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
 //! for chunk in grid.take_dirty() {
 //!     grid.mesh_chunk(chunk, &mut mesher, &MeshSettings::default(), &mut mesh)?;
-//!     // Open where the ball goes on in the other chunk, and flawless otherwise.
+//!     // The mesh is open where the ball continues in the other chunk, and has no other flaw.
 //!     let report = MeshReport::new(&mesh.positions, &mesh.indices);
 //!     assert!(report.boundary_edges > 0 && report.is_clean());
 //! }
@@ -38,30 +38,32 @@
 //! ```
 //!
 //! # Guaranteed
-//! - Within a chunk and across chunks the surface is closed, 2-manifold, consistently oriented and free of zero-area
-//!   triangles, and every vertex and normal is finite, in both [`Topology`]s and on every input: ties with the isovalue,
-//!   NaN, infinities and subnormal numbers included. Vertices on a shared border are equal bit for bit.
-//! - With [`Topology::Separated`], the default, no two triangles cross, and the surface is that of digital topology: inside
-//!   points are neighbours along the axes, outside points along the diagonals of faces, too.
-//! - With [`Topology::Trilinear`], the surface has the topology of the trilinear interpolant in every cell, as far as
-//!   `f64` tells, but for tunnels whose waist is within 2⁻⁴⁰ of a face of their cell: there, the sheets stay apart. Where
-//!   faces are decided by a tie or by weights that are not finite, the inside stays separated.
-//! - The same samples give the same mesh, and the same stamps in the same order the same samples, bit for bit, on any
-//!   machine.
-//! - No samples, stamps, rays or meshes panic: NaN and infinite samples have a meaning ([`Weight`]), and what cannot be
-//!   meshed is a typed error. (Constructors of a cell's parts say when they do.)
+//! - Within a chunk and across chunks, the surface is closed, 2-manifold, consistently oriented and free of zero-area
+//!   triangles, and every vertex and normal is finite. This holds in both [`Topology`]s and on every input: ties with
+//!   the isovalue, NaN, infinities and subnormal numbers included. Vertices on a shared border are equal bit for bit.
+//! - With [`Topology::Separated`], the default, no two triangles cross, and the surface is that of digital topology:
+//!   inside points are neighbours along the axes only, outside points also along the diagonals of faces.
+//! - With [`Topology::Trilinear`], the surface has the topology of the trilinear interpolant in every cell, to the
+//!   precision of `f64`. The one exception is a tunnel whose waist is within 2⁻⁴⁰ of a face of its cell: there, the
+//!   sheets stay apart. Where a tie or a non-finite weight decides a face, the inside stays separated.
+//! - The same samples give the same mesh, and the same stamps in the same order give the same samples, bit for bit, on
+//!   any machine.
+//! - No samples, stamps, rays or meshes cause a panic. NaN and infinite samples have a meaning ([`Weight`]), and input
+//!   that cannot be meshed gives a typed error. (The constructors of a cell's parts may panic; their docs say when.)
 //! - [`Mesher::mesh`] and [`NeighbourhoodView::mesh`] allocate nothing once their buffers are warm.
 //!
 //! # Not guaranteed
-//! - That no triangles of [`Topology::Trilinear`] cross: none did in tens of millions of random cells, of weights of all
-//!   magnitudes and ties, but there is no proof.
-//! - Well-shaped triangles: crossings lie where the samples put them, so slivers are common.
-//! - Clean meshes of more than 4,096 cells per axis at once: `f32` positions have no room for the clamp there.
+//! - Triangles of [`Topology::Trilinear`] may cross. None did in tens of millions of random cells, with ties and with
+//!   weights of all magnitudes, but there is no proof.
+//! - Triangles need not be well shaped. Crossings lie where the samples put them, so slivers are common.
+//! - A single mesh of more than 4,096 cells per axis need not be clean: `f32` positions are too coarse there to keep
+//!   crossings away from lattice points.
 //!
 //! # Evidence
-//! In how many of 304 generated fields (noise, periodic surfaces, thin sheets, integers with ties, infinities, all
-//! magnitudes; all closed) do meshes have flaws? [`MeshReport`] judges them all; `cargo bench -p marchless_benches --bench
-//! soundness` in the repository reproduces it for the crates, and `benches/peers/soundness.py` for the others.
+//! The table counts the fields, out of 304, whose mesh has a flaw. The fields are generated (noise, periodic surfaces,
+//! thin sheets, integers with ties, infinities, all magnitudes) and closed. [`MeshReport`] judges every mesh. In the
+//! repository, `cargo bench -p marchless_benches --bench soundness` reproduces the figures of the crates, and
+//! `benches/peers/soundness.py` those of the others.
 //!
 //! | extractor | any flaw | open or non-manifold edges | zero-area triangles | crossing triangles | not finite |
 //! |---|---|---|---|---|---|
@@ -75,19 +77,19 @@
 //! | isomesh 0.0.14, its trilinear option | 202 | 2 open, 94 not manifold | 116 | 23 | 32 |
 //! | fast-surface-nets 0.2.1 | 228 | 220 | 44 | 16 | 32 |
 //!
-//! Most flaws come from ties: in the 96 fields without ties and non-finite samples, the first four of the others have none.
-//! Dual methods such as the last are non-manifold by nature where two sheets share a cell.
+//! Most flaws come from ties: in the 96 fields without ties and non-finite samples, the first four of the other
+//! extractors have no flaws. Dual methods such as the last are non-manifold by nature where two sheets share a cell.
 //!
-//! The crate's tests mesh every pattern of signs of one, two and 2 × 2 × 1 cells and ten million of 2 × 2 × 2, and
-//! compare both topologies with references that share nothing with the mesher.
+//! The crate's tests mesh every pattern of signs of one, two and 2 × 2 × 1 cells and ten million patterns of 2 × 2 × 2
+//! cells. They compare both topologies with references that share no code with the mesher.
 //!
-//! # Not promised
+//! # Hidden items
 //! Items that this documentation hides serve `bevy_marchless` and tests, and may change at any time.
 //!
 //! # Features
-//! `std` (default) finds out at run time which instructions the processor has ([`Backend`]), instead of using those
-//! that the crate was compiled for; it adds `ThreadedMesher`, and uses the standard library's square root instead of
-//! `libm`'s. No feature changes a result.
+//! `std` (default) detects the processor's instruction set at run time ([`Backend`]); without it, the crate uses the
+//! instructions that it was compiled for. It adds `ThreadedMesher`, and uses the standard library's square root instead
+//! of `libm`'s. No feature changes a result.
 #![no_std]
 #![deny(unsafe_code)]
 

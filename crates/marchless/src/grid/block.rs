@@ -1,5 +1,5 @@
 //! [`NeighbourhoodView`]: a chunk and its 26 neighbours; [`Neighbourhood`]: a snapshot of them; [`Block`]: the samples
-//! its mesh is made from.
+//! that the chunk's mesh is made from.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,42 +12,42 @@ use crate::lattice::{Samples, Shape};
 use crate::mesher::{MeshError, MeshSettings, Mesher};
 use crate::sample::{Voxel, Weight};
 
-/// A chunk and its 26 neighbours as they are now: all that its mesh depends on, unaffected by later edits, to be
-/// sent to another thread.
+/// A snapshot of a chunk and its 26 neighbours: all that its mesh depends on. Later edits do not affect it, and it may
+/// be sent to another thread.
 #[derive(Clone, Debug)]
 pub struct Neighbourhood<W = i16> {
-    /// x fastest, the chunk itself in the middle; `None` where there is none.
+    /// x fastest, the chunk itself in the middle; `None` where a chunk is absent or beyond the bounds.
     pub(super) chunks: [Option<GridChunk<W>>; 27],
-    /// A bit for each of them: whether it lies beyond the bounds. Within, what is not there is air.
+    /// Bit `i` is set if position `i` of `chunks` lies beyond the bounds. An absent chunk within the bounds is air.
     pub(super) beyond: u32,
     pub(super) cells: u32,
     /// The middle chunk's lowest lattice point.
     pub(super) origin: [i64; 3],
-    /// Of a bounded grid.
+    /// The border of a bounded grid.
     pub(super) border: Option<Border>,
 }
 
-/// The index of the middle one of 27.
+/// The index of the chunk itself in a neighbourhood's `chunks`.
 const CENTRE: usize = 13;
 
 impl<W: Weight> Neighbourhood<W> {
-    /// The same, borrowed.
+    /// A borrowed view of this neighbourhood.
     pub fn view(&self) -> NeighbourhoodView<'_, W> {
         let Self { ref chunks, beyond, cells, origin, border } = *self;
         NeighbourhoodView { chunks: chunks.each_ref().map(Option::as_ref), beyond, cells, origin, border }
     }
 
-    /// [`NeighbourhoodView::is_uniform`].
+    /// Calls [`NeighbourhoodView::is_uniform`].
     pub fn is_uniform(&self) -> bool {
         self.view().is_uniform()
     }
 
-    /// [`NeighbourhoodView::block`].
+    /// Calls [`NeighbourhoodView::block`].
     pub fn block(&self, isovalue: f32, out: &mut Block<W>) {
         self.view().block(isovalue, out);
     }
 
-    /// [`NeighbourhoodView::mesh`].
+    /// Calls [`NeighbourhoodView::mesh`].
     ///
     /// # Errors
     /// As [`Mesher::mesh`]; `out` is then empty.
@@ -62,10 +62,10 @@ impl<W: Weight> Neighbourhood<W> {
     }
 }
 
-/// A chunk and its 26 neighbours in their [`Grid`](super::Grid): all that its mesh depends on, to be meshed here and now.
+/// A chunk and its 26 neighbours, borrowed from their [`Grid`](super::Grid): all that its mesh depends on.
 #[derive(Clone, Copy, Debug)]
 pub struct NeighbourhoodView<'a, W = i16> {
-    /// As in [`Neighbourhood`].
+    /// This field and the next ones are as in [`Neighbourhood`].
     pub(super) chunks: [Option<&'a GridChunk<W>>; 27],
     pub(super) beyond: u32,
     pub(super) cells: u32,
@@ -74,19 +74,19 @@ pub struct NeighbourhoodView<'a, W = i16> {
 }
 
 impl<'a, W: Weight> NeighbourhoodView<'a, W> {
-    /// The chunks, x fastest, each where there is one; the chunk itself is in the middle.
+    /// The 27 chunks, x fastest, the chunk itself in the middle; `None` where a chunk is absent or beyond the bounds.
     pub const fn chunks(&self) -> &[Option<&'a GridChunk<W>>; 27] {
         &self.chunks
     }
 
-    /// A snapshot, which later edits leave as it is.
+    /// A snapshot of the chunks, which later edits do not affect.
     pub fn to_neighbourhood(&self) -> Neighbourhood<W> {
         let Self { chunks, beyond, cells, origin, border } = *self;
         Neighbourhood { chunks: chunks.map(Option::<&_>::cloned), beyond, cells, origin, border }
     }
 
-    /// Whether it is certain, without looking at single samples, that the chunk has no surface: it lies beyond the
-    /// bounds, or all that its mesh reads is one weight (at the border of a bounded grid, the one farthest outside).
+    /// True if the chunk is certain to have no surface, without a look at single samples: it lies beyond the bounds, or
+    /// all 27 chunks are uniform and of one weight. An absent chunk counts as uniform, of weight [`Weight::OUTSIDE`].
     pub fn is_uniform(&self) -> bool {
         let weight = |chunk: Option<&GridChunk<W>>| match chunk {
             Some(GridChunk::Uniform(voxel)) => Some(voxel.weight),
@@ -101,15 +101,16 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         self.beyond >> index & 1 == 1
     }
 
-    /// Gathers the samples that the chunk's mesh at `isovalue` is made from: its own, one layer below and two above; at the
-    /// border of a bounded grid, intersected with its box. Allocates nothing once `out` has held a block of this size.
+    /// Gathers the samples that the chunk's mesh at `isovalue` is made from: the chunk's own, one layer below and two
+    /// above. At the border of a bounded grid, they are intersected with the border's box. Allocates nothing once `out`
+    /// has held a block of this size.
     pub fn block(&self, isovalue: f32, out: &mut Block<W>) {
         let n = self.cells as usize;
         out.resize(self.cells);
-        // Where each of three neighbours along an axis lies in the block, from which of its samples on, and how many.
+        // The spans of the three neighbours along an axis.
         let spans =
             [Span { to: 0, from: n - 1, len: 1 }, Span { to: 1, from: 0, len: n }, Span { to: n + 1, from: 0, len: 2 }];
-        // Every row is read from three chunks at once: most of the time goes into waiting for memory.
+        // Every row is read from three chunks at once, since most of the time is spent waiting for memory.
         for (line, chunks) in self.chunks.as_chunks::<3>().0.iter().enumerate() {
             let [y, z] = [spans[line % 3], spans[line / 3]];
             let uniform =
@@ -139,7 +140,7 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
                 }
             });
         }
-        // Blocks of chunks within do not reach what is clipped.
+        // The blocks of inner chunks do not reach the samples that are clipped.
         if let Some(border) = &self.border
             && self.beyond != 0
         {
@@ -147,8 +148,8 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         }
     }
 
-    /// Meshes the chunk: positions are in cells from its lowest lattice point. `block` is scratch; in a uniform
-    /// neighbourhood it is left as it is, and `out` empty.
+    /// Meshes the chunk. Vertex positions are in cells from its lowest lattice point. `block` is scratch memory. In a
+    /// uniform neighbourhood, `out` is empty and `block` is not touched.
     ///
     /// # Errors
     /// As [`Mesher::mesh`]; `out` is then empty.
@@ -178,7 +179,7 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
     }
 }
 
-/// The samples of one chunk and of the padding around it, `n + 3` per axis; kept by the caller and reused.
+/// The samples of one chunk and of the padding around it, `n + 3` per axis. The caller keeps and reuses a block.
 #[derive(Clone, Debug)]
 pub struct Block<W = i16> {
     shape: Shape,
@@ -193,7 +194,7 @@ impl<W: Weight> Block<W> {
         Self { shape, weights: vec![W::OUTSIDE], materials: vec![0] }
     }
 
-    /// The samples, padded.
+    /// The samples, marked as [padded](Samples::padded).
     pub fn samples(&self) -> Samples<'_, W> {
         Samples::new(self.shape, &self.weights)
             .and_then(|samples| samples.with_materials(&self.materials))
@@ -211,14 +212,15 @@ impl<W: Weight> Block<W> {
         }
     }
 
-    /// Makes room for a chunk of `cells` cells per axis.
+    /// Resizes the block for a chunk of `cells` cells per axis.
     fn resize(&mut self, cells: u32) {
         self.shape = Shape::cube(cells + 3).expect("a chunk's cells are few");
         self.weights.resize(self.shape.len(), W::OUTSIDE);
         self.materials.resize(self.shape.len(), 0);
     }
 
-    /// Calls `change` with every row of a box: the position of its first sample in the block, weights, materials.
+    /// Calls `change` with every row of a box: the position of the row's first sample in the block, its weights and its
+    /// materials.
     fn rows(&mut self, [x, y, z]: [Span; 3], mut change: impl FnMut([usize; 3], &mut [W], &mut [u8])) {
         let [_, along_y, along_z] = self.shape.strides();
         for k in z.to..z.to + z.len {
@@ -237,21 +239,24 @@ impl<W: Weight> Default for Block<W> {
     }
 }
 
-/// `len` samples in a row, from one place to another.
+/// The part of one axis of a block that one chunk fills.
 #[derive(Clone, Copy)]
 struct Span {
+    /// The first index in the block.
     to: usize,
+    /// The first index in the chunk.
     from: usize,
+    /// The number of samples.
     len: usize,
 }
 
-/// Joins a row of three chunks: the last sample of the first, all of the second, two of the third.
+/// Joins a row of three chunks: the last sample of the first, all of the second, the first two of the third.
 fn join<T: Copy>(row: &mut [T], [before, own, after]: [&[T]; 3], from: [usize; 3]) {
     let n = row.len() - 3;
     row[0] = before[from[0] + n - 1];
     let own = &own[from[1]..][..n];
     match own.as_array::<{ DEFAULT_CHUNK_CELLS as usize }>() {
-        // Known to the compiler, the usual length needs no call.
+        // A length that the compiler knows needs no call to `memcpy`.
         Some(own) => *row[1..].first_chunk_mut().expect("three longer") = *own,
         None => row[1..=n].copy_from_slice(own),
     }

@@ -1,14 +1,14 @@
-//! The border of a bounded grid: a box half a voxel inside its outermost planes, with which every sample is intersected
-//! as it is read for a mesh or a ray, so that the surface is closed and its walls are flat.
+//! The border of a bounded grid: a box half a voxel inside its outermost planes. Meshes and rays read every sample
+//! intersected with this box, so the surface is closed and its walls are flat.
 //!
-//! To a surface at an isovalue, a sample `k` points inside of the nearest plane (0 on it, negative beyond it) weighs at
-//! least `isovalue + 0.5 − k` voxels. That is a maximum: clipping twice, or layer by layer, changes nothing. The samples
-//! themselves know no border, so that it may move.
+//! At an isovalue, a sample `k` points inside of the nearest plane (0 on it, negative beyond it) reads as at least
+//! `isovalue + 0.5 − k` voxels. This is a maximum, so clipping twice or layer by layer gives the same result. The
+//! stored samples are not clipped, so the border may move.
 
 use crate::lattice::Region;
 use crate::sample::{Voxel, Weight};
 
-/// Only the samples up to so many points inside of a plane are clipped: deeper ones are out of the surface's reach.
+/// The depth, in points inside of a plane, up to which samples are clipped. The surface does not reach deeper ones.
 const DEPTH: i64 = 4;
 
 /// The box of lattice points of a bounded grid: its planes are points at `min` and at `max`, both included.
@@ -24,19 +24,19 @@ impl Border {
         Self { min: planes.min.map(i64::from), max: planes.max.map(i64::from) }
     }
 
-    /// Whether some point of `region` is clipped.
+    /// True if any point of `region` is clipped.
     pub(crate) fn reaches(&self, region: &Region) -> bool {
-        // The points nearest to the planes are those at two corners.
+        // Two opposite corners hold the coordinates nearest to the planes.
         let ends = [region.min, region.max.map(|v| v.saturating_sub(1))];
         ends.iter().any(|end| self.depth(end.map(i64::from)) <= DEPTH)
     }
 
-    /// Whether a point lies on an outermost plane or beyond: no surface has it inside.
+    /// True if `point` lies on an outermost plane or beyond, where no surface has it inside.
     pub(crate) fn excludes(&self, point: [i32; 3]) -> bool {
         self.depth(point.map(i64::from)) <= 0
     }
 
-    /// What a surface at `isovalue` reads at a point that no chunk of the grid owns.
+    /// The sample that a surface at `isovalue` reads at a point that no chunk of the grid owns.
     pub(super) fn beyond<W: Weight>(&self, point: [i64; 3], isovalue: f32) -> Voxel<W> {
         Voxel::new(wall(self.depth(point), isovalue), 0)
     }
@@ -47,7 +47,7 @@ impl Border {
         if depth > DEPTH { weight } else { larger(weight, wall(depth, isovalue)) }
     }
 
-    /// Every layer of a cube of `size` samples per axis that is clipped: its axis, its index along that axis, and the
+    /// The clipped layers of a cube of `size` samples per axis: for each, its axis, its index along that axis, and the
     /// least weight in it. `origin`: the cube's lowest lattice point.
     pub(super) fn layers<W: Weight>(
         &self,
@@ -64,7 +64,7 @@ impl Border {
         })
     }
 
-    /// How many points inside of the nearest plane `point` lies.
+    /// The number of points that `point` lies inside of the nearest plane; 0 on it, negative beyond it.
     fn depth(&self, point: [i64; 3]) -> i64 {
         (0..3).map(|axis| self.depth_along(axis, point[axis])).fold(i64::MAX, i64::min)
     }
@@ -86,7 +86,7 @@ pub(super) fn layer_indices(axis: usize, layer: usize, size: usize) -> impl Iter
     (0..size).flat_map(move |j| (0..size).map(move |i| layer * strides[axis] + i * along + j * across))
 }
 
-/// The maximum; NaN, which counts as outside, stays.
+/// The larger weight; a NaN in `a`, which counts as outside, stays.
 pub(super) fn larger<W: Weight>(a: W, b: W) -> W {
     if a < b { b } else { a }
 }

@@ -1,4 +1,4 @@
-//! [`GridChunk`]: the samples of one chunk, shared and copied on write, or one voxel for all of them.
+//! [`GridChunk`]: the samples of one chunk. They are shared and copied on write, or one voxel stands for all.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -8,15 +8,15 @@ use super::{GridError, MAX_CHUNK_CELLS, MIN_CHUNK_CELLS, SamplePool};
 use crate::sample::{Voxel, Weight};
 use crate::source::{BOUND_MARGIN, Bound, Source, SourceRegion};
 
-/// Chunks per axis of the boxes that a [`Source`] is asked to bound as a whole: see [`GridChunk::from_source`].
+/// Chunks per axis of the boxes that a [`Source`] bounds as a whole; see [`GridChunk::from_source`].
 pub const BOUND_BOX_CHUNKS: i32 = 4;
 
 /// The samples of one chunk. Cloning is cheap, and the clone is unaffected by later edits.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GridChunk<W = i16> {
-    /// All samples are this one.
+    /// All samples equal this voxel.
     Uniform(Voxel<W>),
-    /// One sample a lattice point.
+    /// One sample per lattice point.
     Samples(Arc<GridSamples<W>>),
 }
 
@@ -30,30 +30,30 @@ pub struct GridSamples<W = i16> {
 }
 
 impl<W: Weight> GridChunk<W> {
-    /// A chunk of air.
+    /// A uniform chunk of air.
     pub const AIR: Self = Self::Uniform(Voxel::AIR);
 
-    /// The base samples of the chunk at chunk position `position`; runs on any thread.
+    /// The base samples of the chunk at chunk position `position`: those of `source`, without edits. Runs on any
+    /// thread.
     ///
     /// The first of these steps that gives an answer decides:
-    /// 1. [`Source::bound`] of the [box](Self::bound_box) of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk, grown by
-    ///    4 points: [`GridChunk::box_without_sampling`];
+    /// 1. [`Source::bound`] of the [box](Self::bound_box) of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk, grown
+    ///    by 4 points: [`GridChunk::box_without_sampling`];
     /// 2. [`Source::bound`] of the chunk, grown by 4 points: [`GridChunk::without_sampling_in`];
     /// 3. [`Source::bound_closely`] of the chunk;
     /// 4. [`Source::fill`].
     ///
-    /// A bound makes the chunk uniform, so two legal bounds of one region may stand for different samples. The fixed order
-    /// makes the result a function of the arguments alone: it does not depend on which steps a caller takes on its own,
-    /// or when. The distances that a bound leaves out are too far from the surface to matter to it, for isovalues within
-    /// ±3 voxels.
+    /// A bound makes the chunk uniform, so two legal bounds of one region may give different samples. The fixed order
+    /// makes the result depend on the arguments alone, not on which steps a caller takes on its own, or when. The
+    /// samples that a bound replaces are too far from the surface to affect it, for isovalues within ±3 voxels.
     ///
-    /// `cells`: 8 to 62 per axis, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit in
-    /// `i32` gives the chunk nearest to it; no grid takes it.
+    /// `cells`: 8 to 62 per axis, clamped. `spacing`: world units per voxel. A position whose lattice points do not fit
+    /// in `i32` gives the nearest chunk that does; no grid accepts such a position.
     pub fn from_source(source: &(impl Source + ?Sized), position: [i32; 3], cells: u32, spacing: f64) -> Self {
         Self::from_source_counted(source, position, cells, spacing).0
     }
 
-    /// The result of [`GridChunk::from_source`], and whether it took sampling (step 4). Arguments as there.
+    /// The result of [`GridChunk::from_source`], and true if step 4 sampled the source. Takes the same arguments.
     pub fn from_source_counted(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -66,8 +66,8 @@ impl<W: Weight> GridChunk<W> {
         }
     }
 
-    /// Steps 3 and 4 of [`GridChunk::from_source`], for callers that have done the others: its result where
-    /// [`GridChunk::without_sampling`] gives `None`, and whether it took sampling. Arguments as there.
+    /// Steps 3 and 4 of [`GridChunk::from_source`], for a caller to whom [`GridChunk::without_sampling`] gave `None`.
+    /// Returns the chunk, and true if step 4 sampled the source. Takes the same arguments as `from_source`.
     pub fn from_uncertain_source(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -81,8 +81,8 @@ impl<W: Weight> GridChunk<W> {
         }
     }
 
-    /// Steps 1 and 2 of [`GridChunk::from_source`]: its result where [`Source::bound`] suffices for it, `None` where steps 3
-    /// and 4 must follow. Costs two bounds at most. Arguments as there.
+    /// Steps 1 and 2 of [`GridChunk::from_source`]: its result if [`Source::bound`] decides it, `None` if steps 3 and 4
+    /// must follow. Calls `bound` twice at most. Takes the same arguments as `from_source`.
     pub fn without_sampling(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -94,8 +94,9 @@ impl<W: Weight> GridChunk<W> {
         Self::without_sampling_in(of_box, source, position, cells, spacing)
     }
 
-    /// The same for callers that keep the answers of boxes. `of_box`: the answer of [`GridChunk::box_without_sampling`] to
-    /// the [box](Self::bound_box) of `position`, for the same source, cells and spacing. Costs one bound at most.
+    /// The result of [`GridChunk::without_sampling`], for callers that cache step 1. `of_box`: the result of
+    /// [`GridChunk::box_without_sampling`] for the [box](Self::bound_box) of `position`, with the same source, cells
+    /// and spacing. Calls [`Source::bound`] once at most.
     ///
     /// ```
     /// use marchless::{BOUND_BOX_CHUNKS, GridChunk};
@@ -118,11 +119,13 @@ impl<W: Weight> GridChunk<W> {
         of_box.or_else(|| Self::box_without_sampling(source, position, 1, cells, spacing))
     }
 
-    /// Each chunk of a box, which are all alike, where [`Source::bound`] is certain of the box grown by 4 points.
+    /// The uniform chunk that every chunk of a box equals, if [`Source::bound`] is certain of the box grown by 4
+    /// points.
     ///
-    /// `position`: the lowest chunk. `chunks`: chunks per axis. Other arguments as of [`GridChunk::from_source`]. Only the
-    /// answer to a whole box of [`BOUND_BOX_CHUNKS`], aligned as [`GridChunk::bound_box`] says, is sure to be what
-    /// `from_source` gives: of another box, an answer may differ from it far from the surface.
+    /// `position`: the lowest chunk. `chunks`: chunks per axis. The other arguments are those of
+    /// [`GridChunk::from_source`]. The result equals that of `from_source` for certain only if the box is a whole box
+    /// of [`BOUND_BOX_CHUNKS`]³ chunks, aligned as in [`GridChunk::bound_box`]. For other boxes, the two may differ far
+    /// from the surface.
     pub fn box_without_sampling(
         source: &(impl Source + ?Sized),
         position: [i32; 3],
@@ -133,8 +136,8 @@ impl<W: Weight> GridChunk<W> {
         Self::from_bound(source.bound(&source_region(position, chunks, cells, spacing).grown(BOUND_MARGIN)))
     }
 
-    /// The position, in boxes, of the box of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk at `position`. The lowest
-    /// chunk of a box is this position times `BOUND_BOX_CHUNKS`.
+    /// The position, in boxes, of the box of [`BOUND_BOX_CHUNKS`]³ chunks that holds the chunk at `position`. The
+    /// lowest chunk of a box is this position times `BOUND_BOX_CHUNKS`.
     pub fn bound_box(position: [i32; 3]) -> [i32; 3] {
         position.map(|v| v.div_euclid(BOUND_BOX_CHUNKS))
     }
@@ -154,7 +157,7 @@ impl<W: Weight> GridChunk<W> {
         Self::collapsed(distances.into_iter().map(W::from_voxels).collect(), materials)
     }
 
-    /// A chunk of `cells` cells per axis from its samples, uniform where they are all equal.
+    /// A chunk of `cells` cells per axis made of these samples. It is uniform if they are all equal.
     ///
     /// `weights` and `materials`: `[n·n·n]` each, x fastest. `cells`: 8 to 62.
     ///
@@ -166,7 +169,7 @@ impl<W: Weight> GridChunk<W> {
         Ok(Self::collapsed(weights, materials))
     }
 
-    /// The sample of index `x + n·(y + n·z)`; air beyond the last one.
+    /// The sample at index `x + n·(y + n·z)`; air beyond the last one.
     pub fn voxel(&self, index: usize) -> Voxel<W> {
         match self {
             Self::Uniform(voxel) => *voxel,
@@ -177,7 +180,7 @@ impl<W: Weight> GridChunk<W> {
         }
     }
 
-    /// The samples, to be changed: a uniform chunk is written out, a shared one copied.
+    /// The samples, to be edited. A uniform chunk is first written out, and shared samples are copied.
     pub(crate) fn samples_mut(&mut self, cells: u32, pool: &mut SamplePool<W>) -> &mut GridSamples<W> {
         if let Self::Uniform(voxel) = *self {
             *self = Self::Samples(pool.filled(voxel, (cells as usize).pow(3)));
@@ -188,8 +191,10 @@ impl<W: Weight> GridChunk<W> {
         }
     }
 
+    /// Checks the number of samples.
+    ///
     /// # Errors
-    /// [`GridError::SamplesLength`] where the samples are not those of a chunk of `cells` cells per axis.
+    /// [`GridError::SamplesLength`] if the samples are not those of a chunk of `cells` cells per axis.
     pub(crate) fn check(&self, cells: u32) -> Result<(), GridError> {
         match self {
             Self::Uniform(_) => Ok(()),

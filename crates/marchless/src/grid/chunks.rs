@@ -1,4 +1,4 @@
-//! [`Chunks`]: the chunks of a grid by position, and where there are some.
+//! [`Chunks`]: the chunks of a grid, and an index of the positions that hold one.
 
 use alloc::collections::{BTreeMap, btree_map::Entry};
 
@@ -7,11 +7,11 @@ use super::occupancy::Occupancy;
 use crate::lattice::Region;
 use crate::sample::Weight;
 
-/// A map from chunk positions to chunks. All positions are such as there can be in a grid.
+/// A map from chunk positions to chunks. All positions lie within [`Grid::largest`](super::Grid::largest).
 #[derive(Clone, Debug)]
 pub(super) struct Chunks<W> {
     map: BTreeMap<[i32; 3], GridChunk<W>>,
-    /// The map's keys.
+    /// The set of the map's keys.
     occupancy: Occupancy,
 }
 
@@ -28,7 +28,7 @@ impl<W: Weight> Chunks<W> {
         self.map.get_mut(&position)
     }
 
-    /// The chunk at `position`, made of air where it is absent.
+    /// The chunk at `position`; an absent chunk is first inserted as air.
     pub(super) fn get_mut_or_air(&mut self, position: [i32; 3]) -> &mut GridChunk<W> {
         match self.map.entry(position) {
             Entry::Occupied(entry) => entry.into_mut(),
@@ -56,12 +56,12 @@ impl<W: Weight> Chunks<W> {
         self.map.iter().map(|(position, chunk)| (*position, chunk))
     }
 
-    /// The chunks from `position` on, in order of position.
+    /// The chunks at or after `position`, in order of position.
     pub(super) fn from(&self, position: [i32; 3]) -> impl Iterator<Item = ([i32; 3], &GridChunk<W>)> {
         self.map.range(position..).map(|(position, chunk)| (*position, chunk))
     }
 
-    /// The positions within `region` that hold a chunk, box by box.
+    /// The positions within `region` that hold a chunk, in the order of [`Occupancy::positions_in`].
     pub(super) fn positions_in(&self, region: Region) -> impl Iterator<Item = [i32; 3]> {
         self.occupancy.positions_in(region)
     }

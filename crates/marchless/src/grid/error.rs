@@ -9,43 +9,43 @@ use crate::lattice::Region;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum GridError {
-    /// Chunks cannot have this size.
+    /// The chunk size is out of range.
     #[error("a chunk has {MIN_CHUNK_CELLS} to {MAX_CHUNK_CELLS} cells per axis, not {found}")]
     ChunkCells {
-        /// What was given.
+        /// The number of cells per axis that was given.
         found: u32,
     },
-    /// A grid cannot have these bounds.
+    /// The bounds are empty or too large.
     #[error(
         "a grid's bounds hold at least one chunk and lie within {:?} to {:?}, but {:?} to {:?} was asked for",
         limits.min, limits.max, bounds.min, bounds.max
     )]
     Bounds {
-        /// What was given, in chunks.
+        /// The bounds that were given, in chunk positions.
         bounds: Region,
-        /// What can be addressed, in chunks.
+        /// The addressable chunk positions.
         limits: Region,
     },
-    /// There is no place for a chunk.
+    /// The chunk position is outside of the grid.
     #[error("chunk {position:?} lies outside of the grid's chunks, {:?} up to, but without, {:?}", bounds.min, bounds.max)]
     OutOfBounds {
         /// The chunk's position.
         position: [i32; 3],
-        /// The grid's bounds, or what can be addressed, in chunks.
+        /// The grid's bounds, or all addressable chunk positions in a grid without bounds.
         bounds: Region,
     },
-    /// The samples are not those of a chunk.
+    /// The number of samples is not that of a chunk.
     #[error(
         "a chunk of {cells} cells per axis has {expected} samples, but there are {weights} weights and {materials} materials"
     )]
     SamplesLength {
         /// Cells per axis.
         cells: u32,
-        /// How many samples that makes.
+        /// The number of samples of such a chunk.
         expected: usize,
-        /// How many weights there are.
+        /// The number of weights that was given.
         weights: usize,
-        /// How many materials there are.
+        /// The number of materials that was given.
         materials: usize,
     },
 }

@@ -1,9 +1,10 @@
-//! Which chunks' meshes a change leaves as they are, although they read changed samples.
+//! Finds the chunks whose meshes a change of samples affects, among those that read the changed samples.
 //!
-//! A vertex lies on an edge whose ends have different signs, and depends on the samples at both ends and their neighbours
-//! along the axes; signs alone decide on triangles, but for the [trilinear topology](Topology::Trilinear), which looks at
-//! the corners of cells. So a changed sample shows only near the surface, as it is or as it was. Signs are words here, a
-//! bit for each sample of a row, and all samples of a row are looked at in one go.
+//! A vertex lies on an edge whose ends have different signs. It depends on the samples at both ends and on their
+//! neighbours along the axes. Signs alone decide the triangles, except in the [trilinear
+//! topology](Topology::Trilinear), which reads the weights at the corners of cells. So a changed sample shows only near
+//! the surface before or after the change. Signs are words here, one bit a sample of a row, so a few operations test a
+//! whole row.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec;
@@ -17,20 +18,21 @@ use crate::lattice::{Region, Samples, Shape};
 use crate::mesher::{MeshSettings, Topology};
 use crate::sample::Weight;
 
-/// At the border isovalues farther from 0, in voxels, are not looked into: half a voxel more may be the same `f32`.
-const MOST_AT_BORDER: f32 = 1e6;
-/// Samples read around the changed ones, either way: the neighbours of their neighbours.
+/// The largest isovalue, either way, in voxels, that is handled at the border. Farther from 0, adding half a voxel may
+/// not change an `f32`.
+const MAX_BORDER_ISOVALUE: f32 = 1e6;
+/// The margin of samples that is read around the changed ones: the neighbours of their neighbours.
 const REACH: u32 = 2;
 
 impl<W: Weight> Grid<W> {
-    /// Of the [chunks affected by](Self::chunks_affected_by) a change, those whose meshes may have become others: in the
-    /// rest, all that has changed is too far from the surface, as it is and as it was, to show.
+    /// The chunks whose meshes a change may have altered, out of the [chunks affected by](Self::chunks_affected_by) it.
+    /// In the others, every changed sample is too far from the surface, before and after the change, to show.
     ///
-    /// `changed`: a box around the changed samples. `before`: every chunk that holds some of them, as it was
-    /// ([`GridChunk::AIR`], where it was absent). `settings`: of the meshes.
+    /// `changed`: a box around the changed samples. `before`: every chunk that holds a changed sample, as it was before
+    /// ([`GridChunk::AIR`] if it was absent). `settings`: the settings of the meshes.
     ///
-    /// `None` where that is not looked into: for boxes of more than 60 points along an axis, isovalues that are not
-    /// finite, and isovalues that are extreme or beyond the weights' range at the border of a bounded grid.
+    /// `None` for cases that are not analysed: boxes of more than 60 points along an axis, isovalues that are not
+    /// finite and, at the border of a bounded grid, isovalues that are extreme or beyond the weights' range.
     #[doc(hidden)]
     pub fn chunks_with_mesh_changes(
         &self,
@@ -45,7 +47,7 @@ impl<W: Weight> Grid<W> {
         let fits = (0..3).all(|axis| changed.size()[axis] + 2 * REACH == read.size()[axis] && read.size()[axis] <= 64);
         let (threshold, border) =
             (W::threshold(settings.isovalue), self.border().filter(|border| border.reaches(&read)));
-        let is_extreme = W::OUTSIDE.inside(threshold) || settings.isovalue.abs() > MOST_AT_BORDER;
+        let is_extreme = W::OUTSIDE.inside(threshold) || settings.isovalue.abs() > MAX_BORDER_ISOVALUE;
         if !fits || border.is_some() && is_extreme {
             return None;
         }
@@ -67,7 +69,8 @@ impl<W: Weight> Grid<W> {
         Some(self.chunks_affected_by(changed).points().filter(has_changed).collect())
     }
 
-    /// The weights of a box, x fastest; outside where the border lets no surface be. Elsewhere it changes no sign.
+    /// The weights of a box, x fastest. They are [`Weight::OUTSIDE`] where the border excludes a point; elsewhere the
+    /// border changes no sign.
     fn weights(&self, region: Region, shape: Shape, border: Option<Border>) -> Vec<W> {
         let mut weights = vec![W::OUTSIDE; shape.len()];
         let [_, along_y, along_z] = shape.strides();
@@ -100,18 +103,20 @@ impl<W: Weight> Grid<W> {
     }
 }
 
-/// Samples of a box, one word a row.
+/// Bits of the samples of a box, one word a row.
 struct Rows<'a> {
+    /// The box.
     read: Region,
-    /// Which samples are inside,
+    /// Set where a sample is inside after the change.
     now: &'a [u64],
-    /// and which were.
+    /// Set where a sample was inside before the change.
     before: Vec<u64>,
+    /// Set where a sample's weight or material changed.
     changed: Vec<u64>,
 }
 
 impl Rows<'_> {
-    /// Notes what has changed in one chunk, whose points are `chunk`, within a box.
+    /// Records the changes of one chunk within the box `within`. `chunk`: the points of the chunk.
     fn compare<W: Weight>(
         &mut self,
         old: &GridChunk<W>,
@@ -126,14 +131,14 @@ impl Rows<'_> {
         if part.is_empty() {
             return;
         }
-        let (mut old_room, mut new_room) = (([W::OUTSIDE; 64], [0; 64]), ([W::OUTSIDE; 64], [0; 64]));
+        let (mut old_scratch, mut new_scratch) = (([W::OUTSIDE; 64], [0; 64]), ([W::OUTSIDE; 64], [0; 64]));
         let (len, first_bit) = (part.size()[0] as usize, part.min[0] - self.read.min[0]);
         for (row, [y, z], _) in self.rows_of(part) {
             let may_flip = |bit: usize| border.is_none_or(|border| !border.excludes([part.min[0] + bit as i32, y, z]));
             let [dx, dy, dz] = [part.min[0] - chunk.min[0], y - chunk.min[1], z - chunk.min[2]].map(|v| v as usize);
             let from = dx + nx * (dy + ny * dz);
-            let (old_weights, old_materials) = row_of(old, from..from + len, &mut old_room);
-            let (new_weights, new_materials) = row_of(new, from..from + len, &mut new_room);
+            let (old_weights, old_materials) = row_of(old, from..from + len, &mut old_scratch);
+            let (new_weights, new_materials) = row_of(new, from..from + len, &mut new_scratch);
             let (mut changed, mut flipped) = (0u64, 0u64);
             if old_weights != new_weights {
                 for (bit, (old, new)) in old_weights.iter().zip(new_weights).enumerate() {
@@ -152,8 +157,9 @@ impl Rows<'_> {
         }
     }
 
-    /// The ends of edges with vertices that depend on changed samples, and corners of cells with such triangles.
-    /// `changed`: the box that the changed samples are in, [`REACH`] inside of what was read.
+    /// The samples through which the change shows: the ends of edges whose vertices depend on changed samples, and the
+    /// corners of cells whose triangles do. One word a row. `changed`: the box around the changed samples, [`REACH`]
+    /// inside of the box that was read.
     fn shows(&self, changed: Region, topology: Topology) -> Vec<u64> {
         let ny = self.read.size()[1] as usize;
         let mut shows = vec![0; self.now.len()];
@@ -166,14 +172,15 @@ impl Rows<'_> {
             if near == 0 {
                 continue;
             }
-            // Samples with a neighbour of the other sign. At the ends of what was read, that is not true, but nothing changed.
+            // Samples with a neighbour of the other sign. At the ends of a row this is wrong, but nothing changed
+            // there.
             let ends = |signs: &[u64]| {
                 let apart = beside.iter().fold(0, |all, beside| all | (signs[row] ^ signs[*beside]));
                 apart | (signs[row] ^ signs[row] << 1) | (signs[row] ^ signs[row] >> 1)
             };
             shows[row] = near & (ends(self.now) | ends(&self.before));
             if topology == Topology::Trilinear {
-                // Samples not all of whose 26 neighbours have their sign.
+                // Samples of which any of the 26 neighbours has the other sign.
                 let mixed = |signs: &[u64]| {
                     let nine = || [row - ny, row, row + ny].into_iter().flat_map(|row| &signs[row - 1..row + 2]);
                     let (any, all) = nine().fold((0, u64::MAX), |(any, all), word| (any | word, all & word));
@@ -185,7 +192,8 @@ impl Rows<'_> {
         shows
     }
 
-    /// The rows of a box within what was read: number, y and z, and which of its samples lie in the box.
+    /// The rows of a box within the box that was read: each row's number, its y and z, and a mask of its samples that
+    /// lie in the box.
     fn rows_of(&self, part: Region) -> impl Iterator<Item = (usize, [i32; 2], u64)> + use<> {
         let (read, ny) = (self.read, self.read.size()[1] as usize);
         let ends = [part.min[0], part.max[0]].map(|x| (1u128 << (x - read.min[0]).clamp(0, 64)) - 1);
@@ -199,17 +207,17 @@ impl Rows<'_> {
     }
 }
 
-/// The weights and the materials of a chunk's samples in a row of at most 64, where they are; those of a uniform chunk
-/// are written to `room`.
+/// The weights and materials of a chunk's samples at `indices`, at most 64. Those of a uniform chunk are written to
+/// `scratch`.
 fn row_of<'a, W: Weight>(
     chunk: &'a GridChunk<W>,
     indices: Range<usize>,
-    room: &'a mut ([W; 64], [u8; 64]),
+    scratch: &'a mut ([W; 64], [u8; 64]),
 ) -> (&'a [W], &'a [u8]) {
     match chunk {
         GridChunk::Samples(samples) => (&samples.weights[indices.clone()], &samples.materials[indices]),
         GridChunk::Uniform(voxel) => {
-            let (weights, materials) = (&mut room.0[..indices.len()], &mut room.1[..indices.len()]);
+            let (weights, materials) = (&mut scratch.0[..indices.len()], &mut scratch.1[..indices.len()]);
             weights.fill(voxel.weight);
             materials.fill(voxel.material);
             (weights, materials)
@@ -228,16 +236,15 @@ mod tests {
     const CELLS: u32 = 8;
     const CHUNKS: Region = Region::new([-1; 3], [2; 3]);
 
-    /// Hills, with distances up to where edits no longer reach; or noise.
+    /// Hills with distances beyond the reach of edits, or noise.
     fn ground(seed: u32, bounded: bool, is_noise: bool) -> Grid<i16> {
         let mut grid = if bounded { Grid::bounded(CELLS, CHUNKS) } else { Grid::new(CELLS) }.unwrap();
         let [a, b] = [seed % 7, seed % 5].map(f64::from);
         let hills = move |[x, y, z]: [f64; 3]| y - 6.0 - (x / (3.0 + a)).sin() * 3.0 - (z / (2.0 + b)).cos() * 2.0;
         let noise = move |p: [f64; 3]| {
-            let bits = p
-                .iter()
-                .fold(seed, |bits, v| (bits ^ (*v as i32).cast_unsigned()).wrapping_mul(0x9e37_79b1) ^ bits >> 15);
-            f64::from(bits % 4096) / 512.0 - 4.0
+            let point_seed =
+                p.iter().fold(u64::from(seed), |seed, v| seed << 8 ^ u64::from((*v as i32).cast_unsigned()));
+            fastrand::Rng::with_seed(point_seed).f64() * 8.0 - 4.0
         };
         for position in CHUNKS.points() {
             if is_noise { grid.fill(position, &noise, 1.0) } else { grid.fill(position, &hills, 1.0) }.unwrap();
@@ -247,10 +254,10 @@ mod tests {
     }
 
     fn stamp() -> impl Strategy<Value = QuantisedStamp> {
-        let place = || prop::array::uniform3(-10.0..18.0f64);
+        let center = || prop::array::uniform3(-10.0..18.0f64);
         let shape = prop_oneof![
-            (place(), 0.5..7.0f64).prop_map(|(center, radius)| QuantisedShape::sphere(center, radius).unwrap()),
-            (place(), prop::array::uniform3(0.5..6.0f64))
+            (center(), 0.5..7.0f64).prop_map(|(center, radius)| QuantisedShape::sphere(center, radius).unwrap()),
+            (center(), prop::array::uniform3(0.5..6.0f64))
                 .prop_map(|(center, half)| QuantisedShape::cuboid(center, half).unwrap()),
         ];
         let operation = prop_oneof![Just(Operation::Dig), Just(Operation::Add), Just(Operation::Paint)];
@@ -269,7 +276,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn chunks_that_are_not_redrawn_look_the_same(
+        fn chunks_without_mesh_changes_have_equal_meshes(
             seed in any::<u32>(),
             [bounded, is_noise, exact] in any::<[bool; 3]>(),
             isovalue in prop_oneof![Just(0.0f32), -2.0..2.0f32],
@@ -288,21 +295,22 @@ mod tests {
             let changed_meshes = after.chunks_with_mesh_changes(&old, changed, &settings);
             prop_assert!(changed_meshes.is_some());
             for position in affected.points() {
-                let looks_the_same = || mesh(&before, position, &settings) == mesh(&after, position, &settings);
+                let is_equal = || mesh(&before, position, &settings) == mesh(&after, position, &settings);
                 let has_changed = changed_meshes.as_ref().is_none_or(|changed_meshes| changed_meshes.contains(&position));
-                prop_assert!(has_changed || looks_the_same(), "chunk {:?}", position);
+                prop_assert!(has_changed || is_equal(), "chunk {:?}", position);
             }
         }
     }
 
-    /// One sample of ground in the air, in all places around a corner of eight chunks; with each sample around it changed.
+    /// Puts one solid sample in the air at each position around the common corner of eight chunks, and changes each
+    /// sample near it in turn.
     #[test]
-    fn a_change_that_shows_is_never_missed() {
+    fn no_mesh_change_is_missed() {
         let (settings, mut shown, mut hidden) = (MeshSettings::default(), 0, 0);
         for ground in Region::new([-2; 3], [2; 3]).points() {
             let mut before = Grid::new(CELLS).unwrap();
             for position in CHUNKS.points() {
-                // Nowhere alike, so that all that normals depend on has an effect.
+                // All samples differ, so that every sample that a normal depends on has an effect.
                 before.fill(position, &|[x, y, z]: [f64; 3]| 3.0 + 0.03 * x + 0.05 * y + 0.07 * z, 1.0).unwrap();
             }
             before.set(ground, Voxel::new(-300, 1)).unwrap();
@@ -327,9 +335,9 @@ mod tests {
         assert!(shown > 1000 && hidden > 1000, "{shown}, {hidden}");
     }
 
-    /// A ball dug into flat ground: what it reaches deep below does not show.
+    /// Digs a ball into flat ground. Its effect on deep chunks does not show.
     #[test]
-    fn few_chunks_are_redrawn() {
+    fn only_chunks_near_the_surface_change_meshes() {
         let mut grid = Grid::new(16).unwrap();
         for position in CHUNKS.points() {
             grid.fill(position, &|[_, y, _]: [f64; 3]| y - 6.5, 1.0).unwrap();

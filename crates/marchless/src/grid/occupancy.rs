@@ -1,8 +1,8 @@
-//! [`Occupancy`]: which chunk positions hold a chunk, as a pyramid of bit masks.
+//! [`Occupancy`]: the set of chunk positions that hold a chunk, as a pyramid of bit masks.
 //!
-//! A box of level `k` holds 8^k chunk positions per axis, and a mask tells which of its 8 × 8 × 8 boxes of level `k − 1`
-//! hold a chunk; the boxes of level 0 are the chunk positions. Only boxes that hold a chunk are kept, so a search
-//! descends to what is there and passes by any amount of nothing in few steps.
+//! A box of level `k` holds 8^k chunk positions per axis. Its mask tells which of its 8 × 8 × 8 boxes of level `k − 1`
+//! hold a chunk. The boxes of level 0 are the chunk positions. Only boxes that hold a chunk are kept, so a search skips
+//! empty space of any size in a few steps.
 
 use alloc::collections::{BTreeMap, btree_map::Entry};
 use core::array::from_fn;
@@ -11,16 +11,16 @@ use crate::lattice::Region;
 
 /// The level of the one box that holds all chunk positions of all grids: 2³⁰ per axis.
 pub(crate) const TOP: usize = 10;
-/// What is added to a chunk position, so that none is negative: octal, one digit a level. With fours throughout, the
-/// position 0 lies in the middle of its box on each level, not at the corner of eight.
+/// The offset that makes every chunk position non-negative when added to it. It is octal, one digit a level. Since all
+/// digits are 4, the position 0 lies in the middle of its box on each level, not at the corner of eight boxes.
 pub(crate) const OFFSET: i32 = 0o4_444_444_444;
 
-/// Which boxes of 8 × 8 × 8 are meant: one word per z, bit `x + 8·y`.
+/// A set of boxes out of 8 × 8 × 8: one word per z, bit `x + 8·y`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Mask([u64; 8]);
 
 impl Mask {
-    /// Of the box's index, the lowest three bits per axis count.
+    /// The word and the bit of a box. Only the lowest three bits per axis of its index count.
     const fn place([x, y, z]: [i32; 3]) -> (usize, u64) {
         ((z & 7) as usize, 1 << ((x & 7) | (y & 7) << 3))
     }
@@ -34,7 +34,7 @@ impl Mask {
         self.0 == [0; 8]
     }
 
-    /// The lowest place, and whether there is no other; `None` of an empty mask.
+    /// The lowest box in the set, and true if it is the only one; `None` if the set is empty.
     fn first(&self) -> Option<([i32; 3], bool)> {
         let z = self.0.iter().position(|&word| word != 0)?;
         let bit = self.0[z].trailing_zeros() as i32;
@@ -42,9 +42,9 @@ impl Mask {
         Some(([bit & 7, bit >> 3, z as i32], is_only))
     }
 
-    /// The places from `low` to `high`, both included and 0 to 7.
+    /// The boxes of the set from `low` to `high`, both included; each is 0 to 7 per axis.
     fn within(mut self, low: [i32; 3], high: [i32; 3]) -> Self {
-        // The bits from the lowest to the highest of a row, in all rows from the lowest to the highest.
+        // `layer` has the bits from `low[0]` to `high[0]`, in the rows from `low[1]` to `high[1]`.
         let row = (0xff << low[0]) & (0xff >> (7 - high[0])) & 0xff;
         let rows = (u64::MAX << (8 * low[1])) & (u64::MAX >> (8 * (7 - high[1])));
         let layer = (row * 0x0101_0101_0101_0101) & rows;
@@ -54,7 +54,7 @@ impl Mask {
         self
     }
 
-    /// All places but the lowest.
+    /// The set without its lowest box.
     fn without_first(mut self) -> Self {
         if let Some(word) = self.0.iter_mut().find(|word| **word != 0) {
             *word &= *word - 1;
@@ -63,7 +63,7 @@ impl Mask {
     }
 }
 
-/// A set of chunk positions, of those that a grid may have.
+/// A set of chunk positions that a grid may have.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Occupancy {
     /// The boxes of level 1 up to [`TOP`], by their index.
@@ -86,7 +86,7 @@ impl Occupancy {
         }
     }
 
-    /// Takes a position out.
+    /// Removes a position.
     pub(super) fn remove(&mut self, position: [i32; 3]) {
         let mut index = position.map(|v| v + OFFSET);
         for level in &mut self.levels {
@@ -101,12 +101,12 @@ impl Occupancy {
         }
     }
 
-    /// What a box holds. `level`: 1 to [`TOP`].
+    /// The mask of a box; `None` if it is empty. `level`: 1 to [`TOP`].
     fn mask(&self, level: usize, index: [i32; 3]) -> Option<&Mask> {
         self.levels[level - 1].get(&index)
     }
 
-    /// The smallest box that holds all positions: its level, 1 to [`TOP`], and its index. `None` where there are none.
+    /// The smallest box that holds all positions: its level, 1 to [`TOP`], and its index. `None` if the set is empty.
     pub(crate) fn root(&self) -> Option<(usize, [i32; 3])> {
         let (mut level, mut index) = (TOP, [0; 3]);
         loop {
@@ -118,15 +118,15 @@ impl Occupancy {
         }
     }
 
-    /// Of a box, the boxes one level below from which a step of 0 or 1 per axis leads to a box that holds a position. Of
+    /// The boxes one level below a box from which a step of 0 or 1 per axis leads to a box that holds a position. At
     /// level 1, these are the chunk positions whose meshes read the samples of a chunk for more than normals.
     pub(crate) fn drawn(&self, level: usize, index: [i32; 3]) -> Mask {
-        // What the boxes beside it on the high sides hold: bit 0 is x, bit 1 y, bit 2 z.
+        // The masks of the box and its neighbours on the high sides: bit 0 of `side` is x, bit 1 y, bit 2 z.
         let around: [Mask; 8] = from_fn(|side| {
             let neighbour = from_fn(|axis| index[axis] + (side as i32 >> axis & 1));
             self.mask(level, neighbour).copied().unwrap_or_default()
         });
-        // Along x, y and then z, each place takes over what its neighbour on the high side holds.
+        // Along x, y and then z, each bit is joined with that of its neighbour on the high side.
         const LAST_COLUMN: u64 = 0x8080_8080_8080_8080;
         let row = |low: u64, high: u64| low | (low >> 1 & !LAST_COLUMN) | (high << 7 & LAST_COLUMN);
         let layer = |z: usize, side: usize| {
@@ -143,7 +143,7 @@ impl Occupancy {
         drawn
     }
 
-    /// The positions within `region`, box by box.
+    /// The positions within `region`, in the order of a descent box by box.
     pub(super) fn positions_in(&self, region: Region) -> PositionsIn<'_> {
         let end = (1i64 << (3 * TOP)) - 1;
         let index = |v: i32, less: i64| (i64::from(v) + i64::from(OFFSET) - less).clamp(0, end) as i32;
@@ -154,7 +154,7 @@ impl Occupancy {
             level: TOP,
             open: [([0; 3], Mask::default()); TOP],
         };
-        // Of a region beyond all grids, clamping leaves a layer at the end, which holds nothing either.
+        // Clamping turns a region beyond all grids into an outermost layer, which holds nothing either.
         if !region.is_empty() {
             positions.open(TOP, [0; 3]);
         }
@@ -162,24 +162,24 @@ impl Occupancy {
     }
 }
 
-/// An iterator over positions, that descends from box to box.
+/// An iterator over positions that descends from box to box.
 #[derive(Clone, Debug)]
 pub(super) struct PositionsIn<'a> {
     occupancy: &'a Occupancy,
-    /// The lowest and the highest position, both included, [`OFFSET`] added.
+    /// The lowest and the highest position, both included, with [`OFFSET`] added.
     low: [i32; 3],
     high: [i32; 3],
-    /// The level of the box that is being gone through.
+    /// The level of the current box.
     level: usize,
-    /// Of each level from 1 on, the box that is being gone through, and what of it is still to come.
+    /// The current box of each level from 1 on: its index, and the boxes within that are still to be visited.
     open: [([i32; 3], Mask); TOP],
 }
 
 impl PositionsIn<'_> {
-    /// Starts to go through a box, where it holds something.
+    /// Makes a box the current one, unless it is empty.
     fn open(&mut self, level: usize, index: [i32; 3]) {
         let Some(mask) = self.occupancy.mask(level, index) else { return };
-        // The places of its boxes that the region reaches into.
+        // The range of its boxes that the region intersects.
         let place = |axis: usize, bound: i32| ((bound >> (3 * (level - 1))) - (index[axis] << 3)).clamp(0, 7);
         let (low, high) = (from_fn(|axis| place(axis, self.low[axis])), from_fn(|axis| place(axis, self.high[axis])));
         self.level = level;
@@ -228,7 +228,7 @@ mod tests {
         [coordinate(), coordinate(), coordinate()]
     }
 
-    /// A set with positions put in and some of them taken out, and the same as a plain set.
+    /// A set after inserting positions and removing some of them, and a plain set of the same positions.
     fn sets() -> impl Strategy<Value = (Occupancy, BTreeSet<[i32; 3]>)> {
         let changes = proptest::collection::vec((position(), any::<prop::sample::Index>(), any::<bool>()), 0..80);
         changes.prop_map(|changes| {
@@ -260,7 +260,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn regions_hold_what_a_plain_set_holds(
+        fn regions_hold_the_positions_of_a_plain_set(
             (occupancy, oracle) in sets(),
             regions in proptest::collection::vec((position(), position()), 8),
         ) {
@@ -280,7 +280,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_is_kept_of_positions_taken_out((mut occupancy, oracle) in sets()) {
+        fn removed_positions_leave_no_boxes((mut occupancy, oracle) in sets()) {
             for (level, boxes) in occupancy.levels.iter().enumerate() {
                 let shift = 3 * (level + 1);
                 let expected: BTreeSet<_> = oracle.iter().map(|p| p.map(|v| (v + OFFSET) >> shift)).collect();
@@ -300,7 +300,7 @@ mod tests {
         }
 
         #[test]
-        fn drawn_boxes_are_those_below_occupied_ones((occupancy, oracle) in sets(), level in 1..=TOP) {
+        fn drawn_boxes_are_one_step_below_occupied_boxes((occupancy, oracle) in sets(), level in 1..=TOP) {
             let below = |p: &[i32; 3]| p.map(|v| (v + OFFSET) >> (3 * (level - 1)));
             let occupied: BTreeSet<_> = oracle.iter().map(below).collect();
             let boxes: BTreeSet<_> = occupied.iter().map(|p| p.map(|v| v >> 3)).collect();

@@ -1,4 +1,4 @@
-//! [`SamplePool`]: memory for copies of samples that are to be changed.
+//! [`SamplePool`]: reusable memory for the copies of samples that edits make.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -7,27 +7,27 @@ use alloc::vec::Vec;
 use super::{GridChunk, GridSamples};
 use crate::sample::Voxel;
 
-/// The memory of samples that are no longer needed, for the samples that edits write out or copy before they change them.
+/// A pool of discarded samples, whose memory edits reuse when they write out or copy samples.
 ///
-/// Where allocators give what is freed back to the thread that allocated it, as many do, copies of samples that came from
-/// other threads take new memory each time, and each page of it has to be mapped, which takes longer than copying.
+/// Many allocators return freed memory to the thread that allocated it. Without a pool, copies of samples that came
+/// from other threads take new memory each time, and mapping its pages takes longer than copying.
 #[derive(Debug)]
 #[doc(hidden)]
 pub struct SamplePool<W = i16>(Vec<Arc<GridSamples<W>>>);
 
-/// As many chunks as a small edit changes at most.
-const MOST: usize = 8;
+/// The capacity of a pool, in chunks: the most that a small edit changes.
+const CAPACITY: usize = 8;
 
 impl<W> SamplePool<W> {
-    /// No memory.
+    /// An empty pool.
     pub const fn new() -> Self {
         Self(Vec::new())
     }
 
-    /// Keeps a chunk's memory, unless some clone of it is still there, or enough has been kept.
+    /// Adds a chunk's memory to the pool, unless a clone still shares it or the pool is full.
     pub fn keep(&mut self, chunk: GridChunk<W>) {
         if let GridChunk::Samples(mut samples) = chunk
-            && self.0.len() < MOST
+            && self.0.len() < CAPACITY
             && Arc::get_mut(&mut samples).is_some()
         {
             self.0.push(samples);
@@ -36,27 +36,28 @@ impl<W> SamplePool<W> {
 }
 
 impl<W: Clone> SamplePool<W> {
-    /// Samples that are all alike.
+    /// `len` samples that all equal `voxel`.
     pub(super) fn filled(&mut self, voxel: Voxel<W>, len: usize) -> Arc<GridSamples<W>> {
-        let Some(mut room) = self.0.pop() else {
+        let Some(mut samples) = self.0.pop() else {
             return Arc::new(GridSamples { weights: vec![voxel.weight; len], materials: vec![voxel.material; len] });
         };
-        let GridSamples { weights, materials } = Arc::make_mut(&mut room);
+        let GridSamples { weights, materials } = Arc::make_mut(&mut samples);
         weights.clear();
         weights.resize(len, voxel.weight);
         materials.clear();
         materials.resize(len, voxel.material);
-        room
+        samples
     }
 
-    /// Makes samples the caller's own, to be changed: where clones of them are there, a copy takes their place.
+    /// Gives the caller unshared samples to edit, as [`Arc::make_mut`] does: if clones share them, a copy replaces
+    /// them.
     pub(super) fn make_mut<'a>(&mut self, samples: &'a mut Arc<GridSamples<W>>) -> &'a mut GridSamples<W> {
         if Arc::get_mut(samples).is_none()
             && let Some(mut copy) = self.0.pop()
-            && let Some(room) = Arc::get_mut(&mut copy)
+            && let Some(target) = Arc::get_mut(&mut copy)
         {
-            room.weights.clone_from(&samples.weights);
-            room.materials.clone_from(&samples.materials);
+            target.weights.clone_from(&samples.weights);
+            target.materials.clone_from(&samples.materials);
             *samples = copy;
         }
         Arc::make_mut(samples)
@@ -83,12 +84,12 @@ mod tests {
         let old = samples(1);
         let address = old.weights.as_ptr();
         pool.keep(GridChunk::Samples(old.clone()));
-        assert!(pool.0.is_empty(), "there is a clone");
+        assert!(pool.0.is_empty(), "a clone shares the memory");
         pool.keep(GridChunk::AIR);
         pool.keep(GridChunk::Samples(old));
         let mut own = samples(2);
         let own_address = own.weights.as_ptr();
-        assert_eq!(pool.make_mut(&mut own).weights.as_ptr(), own_address, "nobody else has it");
+        assert_eq!(pool.make_mut(&mut own).weights.as_ptr(), own_address, "unshared samples are not copied");
         let clone = own.clone();
         pool.make_mut(&mut own).weights[3] = 5;
         assert_eq!((own.weights.as_ptr(), own.weights[2], own.weights[3], own.materials[3]), (address, 2, 5, 7));
@@ -101,7 +102,7 @@ mod tests {
         assert_eq!(written.weights.as_ptr(), address);
         assert_eq!(*written, GridSamples { weights: vec![8; 343], materials: vec![9; 343] });
         assert_eq!(*pool.filled(Voxel::new(8, 9), 343), *written, "without pool memory");
-        (0..2 * MOST).for_each(|_| pool.keep(GridChunk::Samples(samples(3))));
-        assert_eq!(pool.0.len(), MOST);
+        (0..2 * CAPACITY).for_each(|_| pool.keep(GridChunk::Samples(samples(3))));
+        assert_eq!(pool.0.len(), CAPACITY);
     }
 }

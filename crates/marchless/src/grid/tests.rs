@@ -15,7 +15,7 @@ fn voxel() -> impl Strategy<Value = Voxel> {
     (any::<i16>(), any::<u8>()).prop_map(|(weight, material)| Voxel { weight, material })
 }
 
-/// One of: absent, uniform (often air), samples.
+/// A chunk that is absent, uniform (often air), or made of samples.
 fn chunk(cells: u32) -> impl Strategy<Value = Option<GridChunk>> {
     let len = (cells as usize).pow(3);
     prop_oneof![
@@ -27,19 +27,14 @@ fn chunk(cells: u32) -> impl Strategy<Value = Option<GridChunk>> {
 }
 
 fn noise_chunk(seed: u64, len: usize) -> GridChunk {
-    let mut state = seed | 1;
-    let mut next = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        state
-    };
-    let weights = (0..len).map(|_| next() as i16).collect();
-    let materials = (0..len).map(|_| next() as u8).collect();
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let weights = (0..len).map(|_| rng.i16(..)).collect();
+    let materials = (0..len).map(|_| rng.u8(..)).collect();
     GridChunk::Samples(Arc::new(GridSamples { weights, materials }))
 }
 
-/// A grid of up to 3³ random chunks around `centre`, its bounds none, or a box of 1 to 5 chunks per axis around it.
+/// A grid of up to 3³ random chunks around a centre, and the centre. The grid has no bounds, or a box around the
+/// centre.
 fn grid() -> impl Strategy<Value = (Grid, [i32; 3])> {
     let cells = prop_oneof![Just(8u32), Just(9), Just(13)];
     let end = (i32::MAX - 2) / 13 - 3;
@@ -72,7 +67,7 @@ fn around(position: [i32; 3]) -> Region {
     Region::new(position, position).grown(1, 2)
 }
 
-/// The lattice points that the chunk's mesh reads.
+/// The lattice points that the mesh of the chunk at `position` reads.
 fn block_region(position: [i32; 3], cells: u32) -> Region {
     let n = cells as i32;
     Region::new(position.map(|c| n * c - 1), position.map(|c| n * c + n + 2))
@@ -82,7 +77,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_is_set_is_got(
+    fn get_returns_the_sample_that_was_set(
         cells in 8u32..=62,
         writes in proptest::collection::vec(([-130..130i32, -130..130, -130..130], voxel()), 1..60),
     ) {
@@ -152,7 +147,7 @@ proptest! {
     }
 
     #[test]
-    fn bounded_grids_look_as_if_walled((grid, centre) in grid(), chunk_voxel in voxel(), isovalue in -2..3i16) {
+    fn samples_near_the_border_are_clipped_as_meshed((grid, centre) in grid(), chunk_voxel in voxel(), isovalue in -2..3i16) {
         let mut grid = grid;
         let Some(planes) = grid.planes() else { return Ok(()) };
         grid.insert(centre, GridChunk::Uniform(chunk_voxel)).unwrap();
@@ -162,12 +157,12 @@ proptest! {
             let least = if depth <= 4 { 256 * isovalue + 128 - 256 * depth as i16 } else { i16::MIN };
             let expected = Voxel::new(chunk_voxel.weight.max(least), chunk_voxel.material);
             prop_assert_eq!(grid.as_meshed(point, isovalue.into()), expected);
-            prop_assert_eq!(grid.get(point), chunk_voxel, "as it was written");
+            prop_assert_eq!(grid.get(point), chunk_voxel, "the stored sample is not clipped");
         }
     }
 
     #[test]
-    fn other_bounds_are_as_if_there_had_been_no_others(
+    fn changed_bounds_give_the_meshes_of_a_fresh_grid(
         (grid, centre) in grid(), margins in proptest::option::of(([0..3i32, 0..3, 0..3], [1..3i32, 1..3, 1..3])),
     ) {
         let bounds = margins.map(|(low, high)| {
@@ -190,7 +185,7 @@ proptest! {
             }
             prop_assert_eq!(&meshes[1], &meshes[2], "{:?}", position);
             let stays = is_inner(position, grid.bounds()) && is_inner(position, bounds);
-            prop_assert!(!stays || meshes[0] == meshes[1], "only those at borders change: {position:?}");
+            prop_assert!(!stays || meshes[0] == meshes[1], "only chunks at borders change: {position:?}");
         }
         moved.set_bounds(grid.bounds()).unwrap();
         prop_assert!(grid.chunks().eq(moved.chunks()), "nothing is lost");
@@ -219,7 +214,7 @@ proptest! {
             prop_assert_eq!(affected.contains(position), reads && within.contains(position), "{:?}", position);
             found += u32::from(affected.contains(position));
         }
-        prop_assert_eq!(affected.size().iter().product::<u32>(), found, "some lie elsewhere");
+        prop_assert_eq!(affected.size().iter().product::<u32>(), found, "no affected chunk lies elsewhere");
     }
 
     #[test]
@@ -273,7 +268,7 @@ fn snapshots_may_be_sent_to_other_threads() {
 }
 
 #[test]
-fn writing_what_is_there_changes_nothing() {
+fn writing_an_equal_sample_changes_nothing() {
     let mut grid = Grid::<i16>::new(8).unwrap();
     grid.set([1, 2, 3], Voxel::AIR).unwrap();
     assert!(grid.chunks().next().is_none() && grid.dirty().is_empty());
@@ -352,7 +347,7 @@ fn the_ends_of_the_lattice_are_reached_without_panic() {
 }
 
 #[test]
-fn huge_regions_mark_the_chunks_within_and_around_and_no_others() {
+fn huge_regions_mark_only_present_chunks_and_their_neighbours() {
     let mut grid = Grid::<i16>::new(8).unwrap();
     for position in [[0, 0, 0], [70_000, -3, 5], [-50, 2, 2], [9, 9, 400_000]] {
         grid.insert_clean(position, GridChunk::AIR).unwrap();
@@ -361,7 +356,7 @@ fn huge_regions_mark_the_chunks_within_and_around_and_no_others() {
     grid.mark_dirty(region);
     let within = [[0, 0, 0], [70_000, -3, 5], [-50, 2, 2]];
     assert_eq!(grid.dirty(), &within.into_iter().flat_map(|position| around(position).points()).collect());
-    // Samples of a chunk just outside are read by those within.
+    // Chunks within the region read samples of a chunk just outside.
     grid.take_dirty();
     grid.mark_dirty(Region::new([8, -8_000, -8_000], [8_000, 8_000, 8_000]));
     let around_zero = around([0; 3]).points().filter(|position| position[0] >= 0);
@@ -370,7 +365,7 @@ fn huge_regions_mark_the_chunks_within_and_around_and_no_others() {
 
 proptest! {
     #[test]
-    fn chunks_in_a_region_are_those_of_all_chunks_that_lie_in_it((mut grid, centre) in grid(), shift in [-2..2i32, -2..2, -2..2]) {
+    fn chunks_in_a_region_are_all_chunks_filtered_by_it((mut grid, centre) in grid(), shift in [-2..2i32, -2..2, -2..2]) {
         let low: [i32; 3] = core::array::from_fn(|axis| centre[axis] + shift[axis]);
         let region = Region::new(low, low.map(|v| v + 2));
         let everything = Region::new([i32::MIN; 3], [i32::MAX; 3]);
@@ -380,7 +375,7 @@ proptest! {
                 prop_assert_eq!(grid.chunks_in(region).count(), expected.len());
                 prop_assert_eq!(grid.chunks_in(region).collect::<BTreeMap<_, _>>(), expected);
             }
-            // All ways in and out.
+            // Every way to insert and remove a chunk.
             match position[0].rem_euclid(3) {
                 0 => drop(grid.remove_clean(position)),
                 1 => drop(grid.remove(position)),
@@ -390,7 +385,7 @@ proptest! {
     }
 }
 
-/// A ball of stone with a hollow, which knows its bounds.
+/// A hollow ball of stone, as a source with or without bounds.
 #[derive(Clone, Copy)]
 struct Shell {
     centre: [f64; 3],
@@ -432,7 +427,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     #[test]
-    fn bounds_spare_samples_and_change_nothing(
+    fn bounds_spare_sampling_and_change_no_mesh(
         cells in 8u32..=12,
         centre in [-4.0..4.0f64, -4.0..4.0, -4.0..4.0],
         radius in 8.0..60.0f64,
