@@ -1,8 +1,8 @@
-//! Brushes: a [`QuantisedStamp`] is one application of a shape and an operation to samples, in integers throughout.
+//! Brushes: a [`QuantisedStamp`] applies a shape and an operation to samples, in integers throughout.
 //!
-//! A stamp is quantised once, when its shape and stroke are made from floating-point numbers; from then on the same
-//! stamps in the same order give the same samples, bit for bit, on any machine. Each sample changes by itself, so
-//! stamps may be applied to a whole [`Grid`](crate::Grid) or chunk by chunk, each chunk in its own time.
+//! A stamp is quantised once, when its shape and stroke are made from floating-point numbers. From then on, the same
+//! stamps in the same order give the same samples, bit for bit, on any machine. Each sample changes independently, so
+//! stamps may be applied to a whole [`Grid`](crate::Grid), or to each chunk at a different time.
 //!
 //! ```
 //! use marchless::{Grid, Operation, QuantisedShape, QuantisedStamp};
@@ -33,64 +33,66 @@ pub use edit::{Edit, VolumeByMaterial};
 pub use shape::QuantisedShape;
 use shape::{UNITS, units};
 
-/// As far from the surface as an edit ever leaves a sample that it changes: 4 voxels, in steps of an `i16` weight.
+/// The largest distance from the surface, either way, that an edit gives to a sample: 4 voxels, in steps of an `i16`
+/// weight.
 ///
-/// A change of 8 voxels therefore turns any sample that an edit has touched from one side to the other.
+/// A change of 8 voxels therefore moves any sample that an edit has touched from one side to the other.
 pub const EDIT_LIMIT: i16 = 4 * UNITS as i16;
 
-/// One application of a brush: where, what, and of which material.
+/// One application of a brush: a shape, an operation and a material.
 ///
-/// Without a stroke it is a whole stamp: the union with the shape, or its subtraction, at once. With a
-/// stroke, weights move by the stroke's rate while its time goes by. What is solid, and how far from the surface a sample
-/// is, goes by the stamp's isovalue. Changed weights are clamped to within [`EDIT_LIMIT`] of it; a sample whose clamped
-/// weight stays the same stays as it is.
+/// A stamp without a stroke is a whole stamp: it unites the samples with the shape, or subtracts the shape, at once. A
+/// stamp with a stroke moves weights by the stroke's rate times its duration. The stamp's isovalue decides which
+/// samples are solid and how far they are from the surface. Changed weights are clamped to within [`EDIT_LIMIT`] of it.
+/// A sample does not change if its clamped weight would stay the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct QuantisedStamp {
-    /// Where.
+    /// The shape that the stamp acts on.
     pub shape: QuantisedShape,
-    /// What.
+    /// The operation on the samples of the shape.
     pub operation: Operation,
-    /// The material of the samples that become solid, or that are painted; digging does not use it.
+    /// The material that painted samples take, and samples that become solid; digging does not use it.
     pub material: u8,
-    /// How far weights move, for a stamp that is a part of a timed stroke; painting does not use it.
+    /// The part of a timed stroke that the stamp applies; `None` for a whole stamp. Painting does not use it.
     pub stroke: Option<QuantisedStroke>,
-    /// The least weight that is not solid, in 1/256 voxel: what the surface's isovalue is, rounded up. Values beyond
-    /// ±[`QuantisedStamp::MAX_ISOVALUE`] count as that.
+    /// The least weight that is not solid, in 1/256 voxel: the surface's isovalue, rounded up. It is clamped to
+    /// ±[`QuantisedStamp::MAX_ISOVALUE`].
     pub isovalue: i16,
 }
 
 /// What a stamp does to the samples of its shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Operation {
-    /// Makes solid. Samples that become solid take the stamp's material.
+    /// Turns the samples solid. Samples that become solid take the stamp's material.
     Add,
-    /// Makes air. Samples keep their material.
+    /// Turns the samples into air. Samples keep their material.
     Dig,
-    /// Gives the solid samples inside the shape the stamp's material; weights stay.
+    /// Gives the solid samples inside the shape the stamp's material. Weights do not change.
     Paint,
 }
 
 /// The part of a timed stroke that a stamp applies: the time from `start_us` to `end_us`, at a rate.
 ///
-/// A sample whose own rate is `r` moves by ⌊r·end⌋ − ⌊r·start⌋, so it makes no difference into how many stamps, end
-/// to start, a stroke is cut. The sample's rate is `rate` at least `falloff` deep inside the shape and falls linearly
-/// to 0 at the shape's surface.
+/// A sample with rate `r` moves by ⌊r·end⌋ − ⌊r·start⌋, so a stroke may be cut into any number of consecutive stamps
+/// without a change of the result. The sample's rate is `rate` where it is `falloff` or more deep inside the shape, and
+/// falls linearly to 0 at the shape's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct QuantisedStroke {
-    /// The user's number for the stroke that this stamp is a part of; it has no effect on the samples.
+    /// The user's id of the stroke that this stamp is a part of; it has no effect on the samples.
     pub id: u64,
-    /// How fast weights move where the falloff does not reach, in 1/256 voxel per second.
+    /// The speed of weights deeper inside the shape than `falloff`, in 1/256 voxel per second.
     pub rate: u32,
     /// The width of the rim within the shape over which the rate falls to 0, in 1/256 voxel.
     pub falloff: u32,
-    /// When the part begins, in microseconds since the stroke began.
+    /// The start of the part, in microseconds since the stroke began.
     pub start_us: u64,
-    /// When it ends, likewise; nothing moves where that is not after the beginning.
+    /// The end of the part, in microseconds since the stroke began. Nothing moves unless it is after the start.
     pub end_us: u64,
 }
 
 impl QuantisedStamp {
-    /// The highest isovalue, either way, in 1/256 voxel: some 124 voxels, so that weights have room around it.
+    /// The largest isovalue, either way, in 1/256 voxel: about 124 voxels. It leaves [`EDIT_LIMIT`] for weights around
+    /// it.
     pub const MAX_ISOVALUE: i16 = i16::MAX - EDIT_LIMIT;
 
     /// A whole stamp on the surface at isovalue 0.
@@ -98,26 +100,26 @@ impl QuantisedStamp {
         Self { shape, operation, material, stroke: None, isovalue: 0 }
     }
 
-    /// The same stamp on the surface at another isovalue, in voxels; rounded up to 1/256, which is solid where a mesh at
-    /// that isovalue is.
+    /// This stamp on the surface at another isovalue, in voxels. The isovalue is rounded up to 1/256 voxel, so that the
+    /// same samples are solid as in a mesh at that isovalue. NaN counts as 0.
     #[must_use]
     pub fn with_isovalue(self, isovalue: f32) -> Self {
         let steps = libm::ceilf(isovalue * UNITS as f32); // NaN counts as 0
         Self { isovalue: (steps as i16).clamp(-Self::MAX_ISOVALUE, Self::MAX_ISOVALUE), ..self }
     }
 
-    /// The same stamp as a part of a timed stroke.
+    /// This stamp as a part of a timed stroke.
     #[must_use]
     pub const fn with_stroke(self, stroke: QuantisedStroke) -> Self {
         Self { stroke: Some(stroke), ..self }
     }
 
-    /// A box around all lattice points that the stamp may change, whatever their samples are.
+    /// A box around all lattice points that the stamp may change. It does not depend on their samples.
     pub fn region(&self) -> Region {
         self.shape.region(self.reach() / UNITS)
     }
 
-    /// How far outside its shape the stamp changes weights, in 1/256 voxel.
+    /// The distance outside its shape up to which the stamp changes weights, in 1/256 voxel.
     const fn reach(&self) -> u32 {
         match (self.operation, self.stroke) {
             (Operation::Add | Operation::Dig, None) => EDIT_LIMIT as u32,
@@ -132,11 +134,11 @@ impl QuantisedStroke {
     /// The widest falloff that [`QuantisedStroke::new`] takes, in voxels.
     pub const MAX_FALLOFF: f64 = QuantisedShape::MAX_RADIUS;
 
-    /// A part of stroke `id`: `rate` in voxels per second, `falloff` in voxels, times since the stroke began.
-    /// Rate and falloff are rounded to 1/256, times cut to whole microseconds.
+    /// A part of stroke `id`. `rate` is in voxels per second, `falloff` in voxels, and times count from the start of
+    /// the stroke. Rate and falloff are rounded to 1/256 voxel, and times are truncated to microseconds.
     ///
     /// # Errors
-    /// [`BrushError`] where a number is NaN, negative or beyond its limit, or the end lies before the start.
+    /// [`BrushError`] if a number is NaN, negative or beyond its limit, or if the end lies before the start.
     pub fn new(id: u64, rate: f64, falloff: f64, start: Duration, end: Duration) -> Result<Self, BrushError> {
         if !(0.0..=Self::MAX_RATE).contains(&rate) {
             return Err(BrushError::Rate { found: rate });
@@ -158,7 +160,7 @@ impl QuantisedStroke {
     }
 }
 
-/// Why a brush cannot be made of the numbers given.
+/// The reason why a shape or a stroke was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BrushError {

@@ -1,4 +1,4 @@
-//! What a lattice point holds: a [`Weight`], the signed distance to the surface, and a material.
+//! [`Voxel`]: the sample at a lattice point, a [`Weight`] (the signed distance to the surface) and a material.
 
 use core::fmt::Debug;
 
@@ -7,12 +7,12 @@ use core::fmt::Debug;
 pub struct Voxel<W = i16> {
     /// Signed distance to the surface; negative is inside, zero and positive are outside.
     pub weight: W,
-    /// The user's number for what the point is made of; it has no effect on the shape.
+    /// The user's number for the material; it has no effect on the shape.
     pub material: u8,
 }
 
 impl<W: Weight> Voxel<W> {
-    /// Air: as far outside as the weight can say, of material 0.
+    /// Air: a voxel of weight [`Weight::OUTSIDE`] and material 0.
     pub const AIR: Self = Self { weight: W::OUTSIDE, material: 0 };
 
     /// A voxel of `weight` and `material`.
@@ -29,7 +29,7 @@ impl<W: Weight> Voxel<W> {
 /// | `i16` | 1/256 voxel | −128 to +127.996 voxels |
 /// | `f32` | – | any; NaN counts as outside, infinities by their sign |
 ///
-/// The trait is sealed: the mesher's passes rely on what these three do.
+/// The trait is sealed, since the mesher's passes rely on these three implementations.
 pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private::Sealed + 'static {
     /// Steps per voxel: 32, 256 or 1.
     const SCALE: f32;
@@ -38,15 +38,15 @@ pub trait Weight: Copy + Debug + PartialEq + PartialOrd + Send + Sync + private:
     /// The weight farthest inside (`MIN`).
     const INSIDE: Self;
 
-    /// The weight of a distance in voxels: saturated to the type's range and rounded to the nearest step, but
-    /// never across zero (a negative distance stays negative, however small). NaN becomes [`Weight::OUTSIDE`].
+    /// The weight of a distance in voxels, saturated to the type's range and rounded to the nearest step. A negative
+    /// distance stays negative, however small. NaN becomes [`Weight::OUTSIDE`].
     fn from_voxels(distance: f32) -> Self;
 
     /// The distance in voxels; exact.
     fn to_voxels(self) -> f32;
 }
 
-/// What the passes need of a weight, out of the users' reach.
+/// The operations on weights that the passes use, hidden from users.
 pub(crate) mod private {
     pub trait Sealed: Sized + Copy + 'static {
         /// The isovalue in this weight's own terms, so that [`Sealed::inside`] is one comparison.
@@ -55,7 +55,7 @@ pub(crate) mod private {
         type Wide: Copy + Default;
         /// `isovalue`: in voxels, finite.
         fn threshold(isovalue: f32) -> Self::Threshold;
-        /// Whether the sample lies below the isovalue.
+        /// True if the sample lies below the isovalue.
         fn inside(self, threshold: Self::Threshold) -> bool;
         fn wide(self) -> Self::Wide;
         /// `a − b` in steps, for gradients; may be infinite or NaN.
@@ -63,20 +63,21 @@ pub(crate) mod private {
         /// Twice the difference, for gradients at an open border.
         fn doubled(difference: Self::Wide) -> Self::Wide;
         fn to_f32(wide: Self::Wide) -> f32;
-        /// Two weights, such that vector instructions take many of them apart with ease.
+        /// Two weights, packed so that vector instructions can split many pairs quickly.
         type Pair: Copy + Default;
         fn pair(weights: [Self; 2]) -> Self::Pair;
         fn both(pair: Self::Pair) -> [Self; 2];
-        /// The same of four weights, in two places.
+        /// Four weights, packed in two parts: `Left` and `Right`.
         type Left: Copy + Default;
         type Right: Copy + Default;
         fn split(weights: [Self; 4]) -> (Self::Left, Self::Right);
         fn joined(left: Self::Left, right: Self::Right) -> [Self; 4];
-        /// How far along the edge from `a` to `b` the isovalue lies, before clamping, and whether it is so: where it is
-        /// not, [`Sealed::fraction`] knows. Has no branch. `isovalue`: in steps (voxels × `SCALE`).
+        /// The fraction of the edge from `a` to `b` at which the isovalue lies, before clamping, and true if it is
+        /// accurate. If it is not, call [`Sealed::fraction`]. Has no branch. `isovalue`: in steps (voxels × `SCALE`).
         fn quick_fraction(a: Self::Wide, b: Self::Wide, isovalue: f32) -> (f32, bool);
-        /// How far along the edge from `a` to `b` the isovalue lies, before clamping; `a` and `b` lie on its two sides.
-        /// Finite, but for a NaN where both ends are the same limit of `f32`. `isovalue`: in steps (voxels × `SCALE`).
+        /// The fraction of the edge from `a` to `b` at which the isovalue lies, before clamping; `a` and `b` lie on its
+        /// two sides. Finite, except for a NaN if both ends are the same limit of `f32`. `isovalue`: in steps (voxels ×
+        /// `SCALE`).
         fn fraction(a: Self, b: Self, isovalue: f32) -> f32;
         /// The sample as a finite number, for the rare gradients that overflow.
         fn finite(self) -> f64;
@@ -84,11 +85,11 @@ pub(crate) mod private {
         fn call<F: PerWeight>(arguments: F::Arguments<'_, Self>) -> F::Output;
     }
 
-    /// A function that each type of weights has a body of its own for.
+    /// A function with a separate body for each type of weights.
     ///
-    /// The passes that need one define it, so that weights know nothing of them; and a body that is not generic is
-    /// compiled in this crate, once, with its level of optimisation. (Refused: a method of [`Sealed`] for each function,
-    /// which would name all passes here, and supertraits of `Weight`, which would too.)
+    /// The pass that needs such a function defines it, so this module names no passes. A body that is not generic is
+    /// compiled once, in this crate, at its level of optimisation. (Refused: a method of [`Sealed`] for each function,
+    /// and supertraits of `Weight`. Both would name all passes here.)
     pub trait PerWeight {
         type Arguments<'a, W: Sealed>;
         type Output;
@@ -126,7 +127,7 @@ macro_rules! integer_weight {
         }
 
         impl private::Sealed for $type {
-            /// The smallest weight that is outside, and whether there is none.
+            /// The smallest weight that is outside, and true if every weight is inside.
             type Threshold = ($type, bool);
 
             fn threshold(isovalue: f32) -> Self::Threshold {
@@ -319,7 +320,7 @@ impl private::Sealed for f32 {
     }
 }
 
-/// Whether `f32` computes well with a number of this size. Has no branch.
+/// True if `f32` computes accurately with a number of this size. Has no branch.
 #[inline(always)]
 pub(crate) const fn is_sound(size: f32) -> bool {
     (size >= 1e-30) & (size < 1e30)

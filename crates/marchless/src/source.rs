@@ -1,4 +1,4 @@
-//! [`Source`]: what a terrain is before anyone edits it, sampled box by box.
+//! [`Source`]: the field that a volume holds before any edit, sampled box by box.
 
 use core::any::Any;
 
@@ -7,44 +7,44 @@ use alloc::sync::Arc;
 
 use crate::lattice::{Shape, ShapeError};
 
-/// How many points around a region must be bounded as well before it is left unsampled: brushes and isovalues reach four
-/// voxels from the surface.
+/// The margin, in points, that must be bounded around a region before it may stay unsampled. Brushes and isovalues
+/// reach four voxels from the surface.
 pub(crate) const BOUND_MARGIN: u32 = 4;
 
-/// The box of lattice points that a [`Source`] is asked about.
+/// A box of lattice points that a [`Source`] samples or bounds.
 ///
-/// Positions are integers, and only [`SourceRegion::position`] turns them into world units, in `f64`: nothing is
-/// lost far from the origin, and the same point has the same position whichever region it is asked through.
+/// Positions are integers, and only [`SourceRegion::position`] turns them into world units, in `f64`. So nothing is
+/// lost far from the origin, and a point has the same position in every region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SourceRegion {
     /// The lowest point, in lattice positions of this level.
     pub min: [i32; 3],
     /// Points per axis.
     pub size: [u32; 3],
-    /// The level of detail: 0 is the finest, and each further one doubles the spacing.
+    /// The level of detail: 0 is the finest, and each further level doubles the spacing.
     pub level: u8,
     /// World units between neighbouring points of this level.
     pub spacing: f64,
 }
 
 impl SourceRegion {
-    /// The world position (terrain space) of the point `index`, counted from the lowest one.
+    /// The world position (terrain space) of the point at `index`, which counts from the lowest point.
     pub fn position(&self, index: [u32; 3]) -> [f64; 3] {
         core::array::from_fn(|axis| (f64::from(self.min[axis]) + f64::from(index[axis])) * self.spacing)
     }
 
-    /// The number of points; saturates where it cannot be addressed.
+    /// The number of points; saturates at `usize::MAX`.
     pub const fn len(&self) -> usize {
         let [x, y, z] = self.size;
         (x as usize).saturating_mul(y as usize).saturating_mul(z as usize)
     }
 
-    /// Whether there is no point.
+    /// True if the region has no points.
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The shape of the slices that are to be filled.
+    /// The shape of the slices that [`Source::fill`] fills.
     ///
     /// # Errors
     /// As [`Shape::new`]; never for the regions that this crate passes to a [`Source`].
@@ -63,25 +63,25 @@ impl SourceRegion {
     }
 }
 
-/// What a [`Source`] knows about a whole region without sampling it.
+/// The answer of a [`Source`] about a whole region that it has not sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// All points lie inside and are of one material.
     Inside {
-        /// The material of them all.
+        /// The material of all points.
         material: u8,
     },
     /// All points lie outside.
     Outside,
-    /// Neither is certain.
+    /// Neither of the above is certain.
     Mixed,
 }
 
 /// A field of signed distances and materials: negative inside, zero and positive outside.
 ///
-/// The distance need only be right in sign and roughly right in size near the surface; a field that grows by about
-/// one voxel a voxel there gives the best normals and the most even brush strokes. Sources are called from any
-/// thread, for one point as often as for many, and must answer the same each time.
+/// Near the surface, the distance must have the right sign, and roughly the right size. A field that grows by about one
+/// voxel per voxel there gives the best normals and the most even brush strokes. Any thread may call a source, for one
+/// point or for many. The answer for a point must always be the same.
 ///
 /// Every closure from a world position to a world distance is a source:
 ///
@@ -92,7 +92,7 @@ pub enum Bound {
 /// let source: Box<dyn Source> = Box::new(ball);
 /// ```
 ///
-/// A source of a known type can be had back from a `dyn Source`, which is an [`Any`].
+/// A `dyn Source` is an [`Any`], so it can be downcast to a known type.
 pub trait Source: Any + Send + Sync {
     /// Samples every point of `region`.
     ///
@@ -100,27 +100,29 @@ pub trait Source: Any + Send + Sync {
     /// divided by [`SourceRegion::spacing`]); NaN counts as outside. `materials`: the same shape, all 0 when called.
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]);
 
-    /// What is certain about all points of `region`. Anything but [`Bound::Mixed`] spares sampling them, so an
-    /// answer that costs less than a few samples pays; a wrong one leaves holes.
+    /// A quick bound of all points of `region`. Any answer but [`Bound::Mixed`] spares sampling them, so this pays off
+    /// if it costs less than a few samples. A wrong answer leaves holes. The default is [`Bound::Mixed`].
     fn bound(&self, region: &SourceRegion) -> Bound {
         let _ = region;
         Bound::Mixed
     }
 
-    /// The same and more, asked where sampling comes next: an answer may cost about as much as one layer of samples.
+    /// A closer bound of all points of `region`, called just before sampling. It may cost about as much as one layer of
+    /// samples.
     ///
-    /// What is left unsampled may lie beside what is sampled, and isovalues may differ from 0 by three voxels. So anything
-    /// but [`Bound::Mixed`] says here as well that all samples would be 3 or more, or −3 or less. By default this is what
-    /// [`Source::bound`] says of the region and four points around it.
+    /// An unsampled region may lie beside a sampled one, and isovalues may differ from 0 by three voxels. So
+    /// [`Bound::Outside`] here also says that all samples would be 3 or more, and [`Bound::Inside`] that they would be
+    /// −3 or less. By default, this is the [`Source::bound`] of the region grown by four points.
     ///
-    /// [`GridChunk::from_source`](crate::GridChunk::from_source) says in which order both bounds are asked. Code that streams chunks
-    /// asks [`Source::bound`] on the thread that must not wait, and this one in the job that samples.
+    /// [`GridChunk::from_source`](crate::GridChunk::from_source) documents the order in which both bounds are called.
+    /// Code that streams chunks calls [`Source::bound`] on the thread that must not wait, and this one in the job that
+    /// samples.
     fn bound_closely(&self, region: &SourceRegion) -> Bound {
         self.bound(&region.grown(BOUND_MARGIN))
     }
 }
 
-/// World position (terrain space) to signed distance in world units; material 0.
+/// A closure from a world position (terrain space) to a signed distance in world units is a source of material 0.
 impl<F: Fn([f64; 3]) -> f64 + Send + Sync + 'static> Source for F {
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], _materials: &mut [u8]) {
         let [nx, ny, nz] = region.size;

@@ -8,9 +8,9 @@ use crate::{
 };
 
 impl Grid<i16> {
-    /// Applies `stamp` to all the chunks it touches, absent ones (air) included, and marks dirty what has changed. In a
-    /// bounded grid nothing changes outside the bounds, and samples on the outermost planes, which no surface has inside, do
-    /// not count as volume.
+    /// Applies `stamp` to all chunks that it touches, and marks the chunks dirty whose meshes read a changed sample.
+    /// Absent chunks count as air. In a bounded grid, nothing changes outside the bounds, and samples on the outermost
+    /// planes do not count as volume, since no surface has them inside.
     pub fn apply(&mut self, stamp: &QuantisedStamp) -> Edit {
         let mut edit = Edit::NONE;
         let touched = stamp.region();
@@ -26,12 +26,13 @@ impl Grid<i16> {
         edit
     }
 
-    /// Applies `stamp` to the samples of one chunk only, and marks dirty what has changed. Nothing changes where there
-    /// is no place for a chunk, nor beyond the bounds where there is no chunk; one that is there changes unseen, and its
-    /// edit has no volume.
+    /// Applies `stamp` to the samples of one chunk only, and marks the chunks dirty whose meshes read a changed sample.
     ///
-    /// Applied to every chunk, each in its own time but with the stamps in the same order, it gives the same samples as
-    /// [`Grid::apply`]. `pool`: memory for a copy of the samples, which is made where clones of the chunk are there.
+    /// An absent chunk counts as air within the grid's limits; outside of them, nothing changes. A present chunk beyond
+    /// the bounds changes too, but its edit has no volume.
+    ///
+    /// Chunks may take the same stamps at different times: if each takes them in the same order, the samples equal
+    /// those of [`Grid::apply`]. `pool`: memory for a copy of the samples, which is made if clones share them.
     #[doc(hidden)]
     pub fn apply_to_chunk(&mut self, position: [i32; 3], stamp: &QuantisedStamp, pool: &mut SamplePool) -> Edit {
         let (cells, planes, origin) = (self.chunk_cells(), self.planes(), self.chunk_region(position).min);
@@ -51,12 +52,12 @@ impl Grid<i16> {
 }
 
 impl GridChunk<i16> {
-    /// Applies `stamp` to the samples of the chunk. A uniform chunk stays uniform where all of it changes alike, and
-    /// samples are written out or copied only where some of them change.
+    /// Applies `stamp` to the samples of the chunk. A uniform chunk stays uniform if all of it is seen to change alike.
+    /// Samples are written out or copied only if some of them change.
     ///
     /// `origin`: the chunk's lowest lattice point. `cells`: its points per axis. `planes`: the outermost lattice planes
-    /// of a bounded grid ([`Grid::planes`]), on and beyond which samples do not count as volume. Nothing changes in a chunk
-    /// whose samples are not `cells³`, or where no chunk has so many.
+    /// of a bounded grid ([`Grid::planes`]), on and beyond which samples do not count as volume. Nothing changes if the
+    /// chunk does not have `cells³` samples, or if `cells` is not a valid chunk size.
     pub fn apply_stamp(
         &mut self,
         origin: [i32; 3],
@@ -99,21 +100,22 @@ impl GridChunk<i16> {
     }
 }
 
-/// One stamp on its way over one chunk.
+/// The application of one stamp to one chunk.
 struct Pass {
     change: Change,
     /// The chunk's lowest lattice point.
     origin: [i32; 3],
-    /// Its points per axis.
+    /// The chunk's points per axis.
     cells: u32,
-    /// Those of its points that the stamp may change; not empty.
+    /// The chunk's points that the stamp may change; not empty.
     area: Region,
-    /// The border of a bounded grid, where the area may reach it.
+    /// The border of a bounded grid; `None` if the area does not reach it.
     border: Option<Border>,
 }
 
 impl Pass {
-    /// What becomes of the area's samples where all are `old`, if a glance shows that it is the same for all.
+    /// The new sample of the whole area, given that all samples are `old`; `None` unless a quick test shows that they
+    /// change alike.
     fn change_of_all(&self, old: Voxel<i16>) -> Option<Voxel<i16>> {
         if self.change.leaves(old) {
             return Some(old);
@@ -121,7 +123,7 @@ impl Pass {
         self.change.distance_over(&self.area).map(|distance| self.change.at_distance(old, distance))
     }
 
-    /// How many points of the area can be inside of a surface.
+    /// The number of points of the area that a surface can have inside.
     fn seen_points(&self) -> u64 {
         let is_seen = |point: &[i32; 3]| self.border.is_none_or(|border| !border.excludes(*point));
         match self.border {
@@ -165,7 +167,7 @@ impl Pass {
         edit
     }
 
-    /// Of the area's row of this number, y and z, and the index of the first sample.
+    /// The y and z of a row of the area, and the index of its first sample.
     fn row(&self, row: u32) -> ([i32; 2], usize) {
         let rows = self.area.size()[1];
         let [y, z] = [self.area.min[1] + (row % rows) as i32, self.area.min[2] + (row / rows) as i32];
@@ -175,7 +177,7 @@ impl Pass {
         ([y, z], x + cells * (dy + cells * dz))
     }
 
-    /// Counts `samples` that changed alike.
+    /// Adds the volume of `samples` samples that changed from `old` to `new`.
     fn count(&self, edit: &mut Edit, old: Voxel<i16>, new: Voxel<i16>, samples: u64) {
         match [old, new].map(|voxel| self.change.is_solid(voxel.weight)) {
             [false, true] => edit.added.add(new.material, samples),

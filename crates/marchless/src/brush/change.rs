@@ -1,19 +1,19 @@
-//! [`Change`]: what a stamp does to one sample.
+//! [`Change`]: the effect of a stamp on one sample.
 
 use super::{EDIT_LIMIT, Operation, QuantisedShape, QuantisedStamp, QuantisedStroke, shape::UNITS};
 use crate::{lattice::Region, sample::Voxel};
 
-/// A stamp made ready to be applied sample by sample.
+/// A stamp prepared to be applied sample by sample.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
-    /// Limited.
+    /// The stamp's [limited](QuantisedShape::limited) shape.
     shape: QuantisedShape,
     operation: Operation,
     material: u8,
     stroke: Option<QuantisedStroke>,
     /// The least weight that is not solid.
     isovalue: i16,
-    /// The range of distances within which they make a difference.
+    /// The range of distances that matter: beyond it, the distance counts as the nearer end.
     low: i32,
     high: i32,
 }
@@ -30,7 +30,7 @@ impl Change {
         Self { shape: stamp.shape.limited(), operation, material, stroke, isovalue, low, high: stamp.reach() as i32 }
     }
 
-    /// What becomes of `old` at `point`.
+    /// The sample that replaces `old` at `point`.
     #[inline]
     pub(super) fn at_point(&self, old: Voxel<i16>, point: [i32; 3]) -> Voxel<i16> {
         if self.leaves(old) {
@@ -39,7 +39,7 @@ impl Change {
         self.at_distance(old, self.shape.distance_within(point, self.low, self.high))
     }
 
-    /// Whether `old` stays as it is at any distance.
+    /// True if `old` does not change, whatever its distance from the shape.
     #[inline]
     pub(super) fn leaves(&self, old: Voxel<i16>) -> bool {
         match self.operation {
@@ -49,13 +49,13 @@ impl Change {
         }
     }
 
-    /// Whether a surface at the stamp's isovalue has the weight inside.
+    /// True if a surface at the stamp's isovalue has the weight inside.
     #[inline]
     pub(super) const fn is_solid(&self, weight: i16) -> bool {
         weight < self.isovalue
     }
 
-    /// What becomes of `old` at a `distance` from the shape, clamped to the range of this change.
+    /// The sample that replaces `old` at `distance` from the shape; `distance` must be clamped to `low..=high`.
     #[inline]
     pub(super) fn at_distance(&self, old: Voxel<i16>, distance: i32) -> Voxel<i16> {
         let (isovalue, limit) = (i32::from(self.isovalue), i32::from(EDIT_LIMIT));
@@ -79,11 +79,11 @@ impl Change {
         Voxel::new((isovalue + new) as i16, if becomes_solid { material } else { old.material })
     }
 
-    /// The clamped distance of all points of `area`, where a glance shows that it is one and the same.
+    /// The clamped distance of all points of `area`; `None` unless a quick test shows that it is the same for all.
     pub(super) fn distance_over(&self, area: &Region) -> Option<i32> {
         let size = area.size();
         let middle = [0, 1, 2].map(|axis| area.min[axis].saturating_add_unsigned(size[axis] / 2));
-        // Distances differ by no more than points are apart, and a step for rounding.
+        // Distances of two points differ by at most the points' distance, and a step for rounding.
         let half = size.map(|size| u64::from(size.div_ceil(2) * UNITS));
         let reach = half.iter().map(|half| half.pow(2)).sum::<u64>().isqrt() as i32 + 2;
         let distance = self.shape.distance(middle);
@@ -97,13 +97,13 @@ impl Change {
     }
 }
 
-/// How deep inside the shape a stroke's full rate begins; never 0.
+/// The depth inside the shape at which a stroke's full rate begins; never 0.
 fn rim(stroke: &QuantisedStroke) -> i32 {
     stroke.falloff.clamp(1, i32::MAX as u32) as i32
 }
 
-/// How far a weight moves in a stroke's time, at a distance from minus the rim to 0. Moves of twice [`EDIT_LIMIT`]
-/// are as good as longer ones.
+/// The length by which a stroke moves a weight, at a distance from minus the rim to 0. It is capped at twice
+/// [`EDIT_LIMIT`], since longer moves have the same effect.
 fn moved(stroke: &QuantisedStroke, distance: i32) -> i32 {
     let rate = u128::from(stroke.rate) * u128::from(distance.unsigned_abs());
     let second = u128::from(rim(stroke).unsigned_abs()) * 1_000_000;

@@ -1,17 +1,17 @@
-//! What a stamp did: [`Edit`].
+//! [`Edit`]: the changes that a stamp made.
 
 use alloc::collections::BTreeMap;
 
 use crate::lattice::Region;
 
-/// What applying a stamp changed.
+/// The changes that one or more stamps made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Edit {
-    /// The smallest box around the changed samples; empty where none changed.
+    /// The smallest box around the changed samples; empty if none changed.
     pub region: Region,
-    /// What became solid, by the material it has now.
+    /// The volume that became solid, by its new material.
     pub added: VolumeByMaterial,
-    /// What became air, by the material it was.
+    /// The volume that became air, by its old material.
     pub removed: VolumeByMaterial,
 }
 
@@ -20,12 +20,12 @@ impl Edit {
     pub const NONE: Self =
         Self { region: Region::new([0; 3], [0; 3]), added: VolumeByMaterial::new(), removed: VolumeByMaterial::new() };
 
-    /// Whether no sample changed, neither its weight nor its material.
+    /// True if no sample's weight or material changed.
     pub const fn is_empty(&self) -> bool {
         self.region.is_empty()
     }
 
-    /// Adds what another edit changed, of other samples or later.
+    /// Adds the changes of another edit, which changed other samples or came later.
     pub fn merge(&mut self, other: &Self) {
         self.region = self.region.union(&other.region);
         self.added.merge(&other.added);
@@ -39,7 +39,7 @@ impl Default for Edit {
     }
 }
 
-/// Volumes in cubic voxels, one a material: each sample counts as one cubic voxel of its own material.
+/// A volume for each material, in cubic voxels. Each sample counts as one cubic voxel of its own material.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VolumeByMaterial(BTreeMap<u8, u64>);
 
@@ -59,12 +59,12 @@ impl VolumeByMaterial {
         self.0.values().fold(0, |total, &volume| total.saturating_add(volume))
     }
 
-    /// Whether there is no volume of any material.
+    /// True if the volume of every material is 0.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The materials that have a volume, in order, each with its volume.
+    /// The materials with a volume above 0 and their volumes, in order of material.
     pub fn iter(&self) -> impl Iterator<Item = (u8, u64)> + '_ {
         self.0.iter().map(|(&material, &volume)| (material, volume))
     }

@@ -14,10 +14,10 @@ const POSITION_LIMIT: i64 = 1 << 38;
 const RADIUS_LIMIT: u32 = 1 << 18;
 const LENGTH_LIMIT: i64 = 1 << 19;
 
-/// Where a stamp works: a shape in lattice space, all numbers in 1/256 voxel.
+/// A shape in lattice space that a stamp acts on. All numbers are in 1/256 voxel.
 ///
-/// The constructors quantise voxels and check limits. Numbers beyond the limits, in a shape put together by
-/// hand, count as the nearest within them.
+/// The constructors quantise voxels and check limits. In a shape that is built by hand, numbers beyond the limits are
+/// clamped to them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QuantisedShape {
     /// All points less than `radius` from `center`.
@@ -31,10 +31,10 @@ pub enum QuantisedShape {
     Box {
         /// The middle.
         center: [i64; 3],
-        /// From the middle to the faces.
+        /// The distance from the middle to the faces, per axis.
         half_size: [u32; 3],
     },
-    /// All points less than `radius` from the segment from `a` to `b`; what a sphere sweeps along it.
+    /// All points less than `radius` from the segment from `a` to `b`.
     Capsule {
         /// One end.
         a: [i64; 3],
@@ -53,28 +53,28 @@ impl QuantisedShape {
     /// The farthest that a capsule's ends may lie apart along an axis, in voxels.
     pub const MAX_LENGTH: f64 = (LENGTH_LIMIT / UNITS as i64) as f64;
 
-    /// A sphere; all in voxels, rounded to 1/256.
+    /// A sphere. Numbers are in voxels, and rounded to 1/256.
     ///
     /// # Errors
-    /// [`BrushError`] where a number is NaN or beyond its limit, or the radius is not above 0.
+    /// [`BrushError`] if a number is NaN or beyond its limit, or the radius is not above 0.
     pub fn sphere(center: [f64; 3], radius: f64) -> Result<Self, BrushError> {
         Ok(Self::Sphere { center: position(center)?, radius: size("radius", radius)? })
     }
 
-    /// A box along the axes, from `center - half_size` to `center + half_size`; all in voxels, rounded to 1/256.
+    /// A box along the axes, from `center - half_size` to `center + half_size`. Numbers are in voxels, and rounded to
+    /// 1/256.
     ///
     /// # Errors
-    /// [`BrushError`] where a number is NaN or beyond its limit, or a half size is not above 0.
+    /// [`BrushError`] if a number is NaN or beyond its limit, or a half size is not above 0.
     pub fn cuboid(center: [f64; 3], half_size: [f64; 3]) -> Result<Self, BrushError> {
         let [x, y, z] = half_size.map(|half| size("half size", half));
         Ok(Self::Box { center: position(center)?, half_size: [x?, y?, z?] })
     }
 
-    /// The capsule around the segment from `a` to `b`; all in voxels, rounded to 1/256.
+    /// The capsule around the segment from `a` to `b`. Numbers are in voxels, and rounded to 1/256.
     ///
     /// # Errors
-    /// [`BrushError`] where a number is NaN or beyond its limit, the ends are too far apart, or the radius is not
-    /// above 0.
+    /// [`BrushError`] if a number is NaN or beyond its limit, the ends are too far apart, or the radius is not above 0.
     pub fn capsule(a: [f64; 3], b: [f64; 3], radius: f64) -> Result<Self, BrushError> {
         let shape = Self::Capsule { a: position(a)?, b: position(b)?, radius: size("radius", radius)? };
         for axis in 0..3 {
@@ -128,8 +128,8 @@ impl QuantisedShape {
         }
     }
 
-    /// The distance, clamped to `low..=high`, of a [limited](Self::limited) shape; much faster where it is clamped.
-    /// `high`: from 0 to [`FAR`].
+    /// The distance from `point` to a [limited](Self::limited) shape, clamped to `low..=high`. It is found much faster
+    /// where it is clamped. `high`: from 0 to [`FAR`].
     #[inline]
     pub(super) fn distance_within(&self, point: [i32; 3], low: i32, high: i32) -> i32 {
         let clamp = Clamp { low: i64::from(low), high: i64::from(high) };
@@ -147,7 +147,7 @@ impl QuantisedShape {
     }
 }
 
-/// Nearest whole number of units to a number of voxels, which must be within the limits above.
+/// The nearest whole number of units to a number of voxels, which must be within the limits above.
 pub(super) fn units(voxels: f64) -> i64 {
     let scaled = voxels * f64::from(UNITS);
     (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i64
@@ -169,7 +169,7 @@ fn size(name: &'static str, voxels: f64) -> Result<u32, BrushError> {
     }
 }
 
-/// From `from`, in units, to the lattice point.
+/// The vector from `from`, in units, to the lattice point `point`.
 fn offset(point: [i32; 3], from: [i64; 3]) -> [i64; 3] {
     core::array::from_fn(|i| i64::from(point[i]) * i64::from(UNITS) - from[i])
 }
@@ -178,13 +178,13 @@ fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// ⌊√`square`⌋. Correctly rounded roots of less than 2⁵² are exact enough for that, and far quicker than integers'.
+/// ⌊√`square`⌋. Below 2⁵², the correctly rounded `f64` root is exact enough, and far quicker than an integer root.
 #[inline]
 fn root(square: u64) -> i64 {
     if square < 1 << 52 { sqrt_f64(square as f64) as i64 } else { square.isqrt() as i64 }
 }
 
-/// Distances clamped to `low..=high`, with square roots only in between.
+/// Computes distances clamped to `low..=high`, and takes square roots only between the limits.
 #[derive(Clone, Copy)]
 struct Clamp {
     low: i64,
@@ -192,13 +192,13 @@ struct Clamp {
 }
 
 impl Clamp {
-    /// Whether an offset is so long on some axis that squares might overflow; then it is beyond `high` for certain, since
-    /// shapes are far smaller.
+    /// True if an offset is so long on an axis that its square might overflow. Its distance is then beyond `high`,
+    /// since shapes are far smaller.
     fn is_far(offset: [i64; 3]) -> bool {
         offset.iter().any(|v| v.abs() > 2 * i64::from(FAR))
     }
 
-    /// The distance to a ball of `radius`, of which the centre is at `-offset`.
+    /// The distance to a ball of `radius` whose centre is at `-offset`.
     fn to_point(self, offset: [i64; 3], radius: u32) -> i64 {
         if Self::is_far(offset) {
             return self.high;
@@ -216,7 +216,7 @@ impl Clamp {
         }
     }
 
-    /// The distance to a box, `beyond` whose faces the point lies by so much on each axis.
+    /// The distance to a box. `beyond`: the distance by which the point lies beyond the faces, per axis.
     fn to_box(self, beyond: [i64; 3]) -> i64 {
         let deepest = beyond[0].max(beyond[1]).max(beyond[2]);
         if deepest <= 0 || beyond.iter().filter(|v| **v > 0).count() == 1 {

@@ -14,28 +14,24 @@ use crate::{
 const CELLS: u32 = 8;
 const BOUNDS: Region = Region::new([-1, 0, -1], [1, 2, 1]);
 
-/// All the points of the test grids, one beyond the high planes left out.
+/// All points of the test grids, except those on the high planes.
 fn all_points() -> impl Iterator<Item = [i32; 3]> {
     let scaled = |v: i32| v * CELLS as i32;
     Region::new(BOUNDS.min.map(scaled), BOUNDS.max.map(scaled)).points()
 }
 
-/// A grid that is solid in one place, air in another and noise between, with weights beyond the limit of edits.
+/// A grid of solid, air and noise chunks, with weights beyond the limit of edits.
 fn grid(seed: u64, bounded: bool) -> Grid<i16> {
     let mut grid = if bounded { Grid::bounded(CELLS, BOUNDS) } else { Grid::new(CELLS) }.unwrap();
-    let mut state = seed | 1;
+    let mut rng = fastrand::Rng::with_seed(seed);
     for (number, position) in BOUNDS.points().enumerate() {
         let chunk = match (number as u64 + seed) % 4 {
             0 => GridChunk::Uniform(Voxel::new(-3000, 7)),
             1 if !bounded => continue,
             1 => GridChunk::AIR,
             _ => {
-                let mut next = || {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                    state >> 33
-                };
-                let weights = (0..CELLS.pow(3)).map(|_| (next() % 3000) as i16 - 1500).collect();
-                let materials = (0..CELLS.pow(3)).map(|_| (next() % 3) as u8).collect();
+                let weights = (0..CELLS.pow(3)).map(|_| rng.i16(-1500..1500)).collect();
+                let materials = (0..CELLS.pow(3)).map(|_| rng.u8(0..3)).collect();
                 GridChunk::from_samples(weights, materials, CELLS).unwrap()
             }
         };
@@ -101,7 +97,7 @@ fn stamp() -> impl Strategy<Value = QuantisedStamp> {
     )
 }
 
-/// The distance as a textbook has it, in units.
+/// The distance by the textbook formula, in units.
 fn distance_oracle(shape: &QuantisedShape, point: [i32; 3]) -> f64 {
     let from = |p: [i64; 3]| [0, 1, 2].map(|i| f64::from(point[i]) * 256.0 - p[i] as f64);
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -121,7 +117,7 @@ fn distance_oracle(shape: &QuantisedShape, point: [i32; 3]) -> f64 {
     }
 }
 
-/// What a stamp makes of a sample, straight from its definition.
+/// The sample that replaces `old`, straight from the definition of a stamp.
 fn change_oracle(stamp: &QuantisedStamp, old: Voxel, point: [i32; 3]) -> Voxel {
     let distance = stamp.shape.distance(point);
     let isovalue = i32::from(stamp.isovalue).clamp(-31_743, 31_743);
@@ -146,7 +142,7 @@ fn change_oracle(stamp: &QuantisedStamp, old: Voxel, point: [i32; 3]) -> Voxel {
     Voxel::new(weight, if from_surface >= 0 && new < 0 { stamp.material } else { old.material })
 }
 
-/// How many points inside of the nearest outermost plane of the bounded test grid a point lies.
+/// The number of points that `point` lies inside of the nearest outermost plane of the bounded test grid.
 fn depth(point: [i32; 3]) -> i32 {
     let cells = CELLS as i32;
     (0..3).map(|i| (point[i] - BOUNDS.min[i] * cells).min(BOUNDS.max[i] * cells - point[i])).min().unwrap()
@@ -266,7 +262,7 @@ proptest! {
     fn a_stamp_is_at_home_at_any_isovalue(
         seed: u64, isovalue in -700i16..700, stamp in stamp(), voxels in -2.0..2.0f32, weight: i16,
     ) {
-        // All weights and the isovalue higher by as much: so is what comes out.
+        // Raising all weights and the isovalue by one amount raises the result by that amount.
         let (mut low, mut high) = (grid(seed, false), grid(seed, false));
         for point in all_points() {
             let Voxel { weight, material } = low.get(point);
@@ -278,7 +274,7 @@ proptest! {
             prop_assert!(low.weight == i16::MAX || low.weight + isovalue == high.weight, "at {point:?}: {low:?}, {high:?}");
         }
         prop_assert_eq!(&edits[0], &edits[1]);
-        // What is solid to a stamp is what a mesh has inside.
+        // A stamp and a mesh at one isovalue have the same samples inside.
         use crate::sample::private::Sealed as _;
         let stamp = stamp.with_isovalue(voxels);
         prop_assert_eq!(weight.inside(i16::threshold(voxels)), weight < stamp.isovalue);
@@ -296,7 +292,7 @@ proptest! {
         for stamp in &stamps {
             edit.merge(&at_once.apply(stamp));
         }
-        // Beyond the bounds of the tests, where an unbounded grid grows, only one of the two is looked at.
+        // `apply` grows an unbounded grid beyond `BOUNDS`; only the points within are compared.
         let positions = BOUNDS.points().collect::<Vec<_>>();
         let mut done = [0; 8];
         let mut edit_in_turns = Edit::NONE;
