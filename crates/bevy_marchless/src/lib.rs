@@ -6,7 +6,13 @@
 //! use bevy_marchless::prelude::*;
 //! use bevy_math::Vec3;
 //!
-//! A game adds `DefaultPlugins` instead; a server needs only these.
+//! fn main() {
+//!     let mut app = App::new();
+//!     // A game adds `DefaultPlugins` instead; a server needs only these.
+//!     app.add_plugins((TaskPoolPlugin::default(), bevy_transform::TransformPlugin, MarchlessPlugins));
+//!     app.add_systems(Startup, setup).add_systems(Update, dig);
+//!     app.update();
+//! }
 //!
 //! /// Hills, about 40 voxels high.
 //! fn setup(mut commands: Commands) {

@@ -50,7 +50,11 @@ use crate::volume::SamplingSettings;
 /// # use bevy_ecs::prelude::*;
 /// # use bevy_math::UVec3;
 ///
-/// A ball of radius 40 in the middle of 128³ voxels: the distance to its surface at each position.
+/// fn setup(mut commands: Commands) {
+///     // A ball of radius 40 in the middle of 128³ voxels: the distance to its surface at each position.
+///     let ball = |[x, y, z]: [f64; 3]| ((x - 64.0).powi(2) + (y - 64.0).powi(2) + (z - 64.0).powi(2)).sqrt() - 40.0;
+///     commands.spawn(Terrain::new(ball).with_extent(UVec3::splat(4)));
+/// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Default, Debug, Clone)]
