@@ -1,4 +1,4 @@
-//! A three-dimensional grid of bits, and operations on all of it that cost a few word operations a row.
+//! [`BitGrid`]: a three-dimensional grid of bits, with operations on whole grids that cost a few word operations a row.
 //!
 //! [caves]: ../../../../crates/marchless/docs/pictures/caves.png
 //! [water]: ../../../../crates/marchless/docs/pictures/water.png
@@ -40,13 +40,13 @@ pub use mesh::BitMesher;
 use samples::SignRows;
 pub use tile::{Tile, TileGrid};
 
-/// One bit for each lattice point.
+/// A grid of one bit for each lattice point.
 ///
 /// Bits are kept in rows of 64-bit words along x: bit `x % 64` of word `x / 64` of row `y + ny·z` is the point `[x, y,
-/// z]`. A row starts with a new word; what is left of its last word is zero.
+/// z]`. A row starts with a new word; the unused bits of its last word are zero.
 ///
-/// Whoever makes the first grid of a shape learns by an error that memory does not hold it. Operations that give another
-/// grid of that shape end the program where memory runs out, as vectors do; their `…_into` forms use a grid that is there.
+/// Constructors return an error if memory cannot hold the grid. Operations that return another grid of the same shape
+/// abort if memory runs out, as vectors do. Their `…_into` forms write to an existing grid.
 ///
 /// ```
 /// use marchless::{Shape, bits::BitGrid};
@@ -68,22 +68,22 @@ impl BitGrid {
     /// A grid of zeros.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold it.
+    /// [`BitsError::TooLarge`] if memory cannot hold the grid.
     pub fn new(shape: Shape) -> Result<Self, BitsError> {
         Self::filled(shape, false)
     }
 
-    /// A grid of zeros, of a shape that another grid has or had.
+    /// A grid of zeros, of the shape of another grid.
     pub(crate) fn empty(shape: Shape) -> Self {
         let [nx, ny, nz] = shape.size().map(|size| size as usize);
         let row = nx.div_ceil(64);
         Self { shape, row, words: Words::zeros(row * ny * nz) }
     }
 
-    /// A grid of bits that all have this value.
+    /// A grid whose bits all have this value.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold it.
+    /// [`BitsError::TooLarge`] if memory cannot hold the grid.
     pub fn filled(shape: Shape, value: bool) -> Result<Self, BitsError> {
         let [nx, ny, nz] = shape.size().map(|size| size as usize);
         let row = nx.div_ceil(64);
@@ -98,10 +98,10 @@ impl BitGrid {
         Ok(grid)
     }
 
-    /// The grid of what `is_set` says of each point.
+    /// A grid whose bits are the results of `is_set` for each point.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold it.
+    /// [`BitsError::TooLarge`] if memory cannot hold the grid.
     pub fn from_fn(shape: Shape, mut is_set: impl FnMut([u32; 3]) -> bool) -> Result<Self, BitsError> {
         let mut grid = Self::new(shape)?;
         let [nx, ny, _] = shape.size();
@@ -114,8 +114,8 @@ impl BitGrid {
         Ok(grid)
     }
 
-    /// The grid of the samples that are inside: whose weight is below `isovalue`, which is in voxels and must be finite.
-    /// Of [padded](Samples::padded) samples, the padding is left out.
+    /// The grid of the samples that are inside: whose weight is below `isovalue`, which is in voxels and must be
+    /// finite. Of [padded](Samples::padded) samples, the padding is left out.
     ///
     /// # Errors
     /// [`BitsError::TooLarge`] where memory does not hold it, [`BitsError::OnlyPadding`] where padding is all there is,
@@ -138,7 +138,7 @@ impl BitGrid {
         self.shape
     }
 
-    /// Whether the bit of a point is set; `false` outside the grid.
+    /// True if the bit of a point is set; false outside the grid.
     pub fn get(&self, position: [u32; 3]) -> bool {
         self.place_of(position).is_some_and(|(word, bit)| self.words[word] >> bit & 1 == 1)
     }
@@ -146,7 +146,7 @@ impl BitGrid {
     /// Sets the bit of a point.
     ///
     /// # Errors
-    /// [`BitsError::OutOfRange`] where the grid has no such point.
+    /// [`BitsError::OutOfRange`] if the grid has no such point.
     pub fn set(&mut self, position: [u32; 3], value: bool) -> Result<(), BitsError> {
         let Some((word, bit)) = self.place_of(position) else {
             return Err(BitsError::OutOfRange { position, shape: self.shape });
@@ -155,17 +155,17 @@ impl BitGrid {
         Ok(())
     }
 
-    /// How many bits are set.
+    /// The number of set bits.
     pub fn count(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Whether no bit is set.
+    /// True if no bit is set.
     pub fn is_empty(&self) -> bool {
         self.words.iter().all(|&word| word == 0)
     }
 
-    /// Where bits are set, in the order of memory: x first, z last.
+    /// The points whose bit is set, in the order of memory: x fastest, z slowest.
     pub fn iter(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let ny = self.shape.size()[1] as usize;
         self.words.iter().enumerate().flat_map(move |(index, &word)| {
@@ -202,7 +202,7 @@ impl BitGrid {
         u64::MAX >> (64 * self.row - nx)
     }
 
-    /// Zeros the bits that are no points.
+    /// Clears the unused bits, which belong to no point.
     pub(crate) fn clear_unused(&mut self) {
         let last = self.last_word();
         if last != u64::MAX {
@@ -231,7 +231,7 @@ impl BitGrid {
     }
 }
 
-/// The numbers of the set bits of a word, the lowest first.
+/// The indices of the set bits of a word, the lowest first.
 pub(crate) fn set_bits(mut word: u64) -> impl Iterator<Item = u32> {
     core::iter::from_fn(move || {
         let bit = (word != 0).then(|| word.trailing_zeros());
@@ -240,17 +240,17 @@ pub(crate) fn set_bits(mut word: u64) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Why an operation on bits could not be done.
+/// The reason why an operation on bits was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BitsError {
-    /// Memory does not hold the grid.
+    /// Memory cannot hold the grid.
     #[error("memory does not hold what a grid of {shape} bits takes")]
     TooLarge {
         /// What was asked for.
         shape: Shape,
     },
-    /// Of padded samples, nothing but padding.
+    /// The padded samples consist of padding only.
     #[error("{shape} padded samples are nothing but padding: at least 3 per axis are needed")]
     OnlyPadding {
         /// The samples, padding included.
@@ -284,7 +284,7 @@ pub enum BitsError {
         /// The grid's shape.
         shape: Shape,
     },
-    /// No grid has the size of a region: it is empty, or has more points than can be counted.
+    /// The region is empty, or has more points than can be counted.
     #[error("no grid has the size of the region from {:?} to {:?}", .region.min, .region.max)]
     RegionSize {
         /// What was given.

@@ -1,9 +1,9 @@
 //! One step of a cellular automaton.
 //!
-//! The neighbours of all points of a word are counted at once, bit by bit of the count: three slabs are added to numbers
-//! of two bits, three of those along x to numbers of four, and three rows of those to numbers of five, the point itself
-//! included. What the rule makes of such a number and of the point is a function of six bits: a decision diagram, of
-//! which every node chooses between two earlier ones, a word at a time.
+//! The neighbours of all points of a word are counted at once, bit by bit of the count: three slabs are added to
+//! numbers of two bits, three of those along x to numbers of four, and three rows of those to numbers of five, the
+//! point itself included. What the rule makes of such a number and of the point is a function of six bits: a decision
+//! diagram, of which every node chooses between two earlier ones, a word at a time.
 
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
@@ -78,10 +78,10 @@ impl BitGrid {
         out
     }
 
-    /// [`stepped`](Self::stepped), into a grid that is there.
+    /// [`stepped`](Self::stepped) into an existing grid.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
+    /// [`BitsError::ShapesDiffer`] if `out` has another shape; it is then unchanged.
     pub fn step_into(&self, rule: &Rule, out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
         dispatch_words(Backend::fastest(), Step { from: self, rule, out });
@@ -304,8 +304,8 @@ fn square(low: &[u64], high: &[u64], ends: &Ends, outside: u64, out: [&mut [u64]
     }
 }
 
-/// The sums of a number of two bits and the points beside it along x. Numbers and points have a word more on either side,
-/// whatever it is.
+/// The sums of a number of two bits and the points beside it along x. Numbers and points have a word more on either
+/// side, whatever it is.
 #[inline(always)]
 fn cross(low: &[u64], high: &[u64], here: &[u64], ends: &Ends, outside: u64, out: [&mut [u64]; 3]) {
     let (from_low, from_high) = (ends.from_low.words(), ends.from_high.words());

@@ -9,16 +9,17 @@
 //!   spreadings and eight ors, the same number of operations whatever the bits are, as long as the grid fits into
 //!   registers. [`Tile`](super::Tile) is such a grid.
 //! - *Word strides* (an article on building cell masks from rows of sign bits held in words along one axis). Four
-//!   passes over the rows, one for each edge of a cell that runs along them. A pass looks at each bit of a word; where it
-//!   is set, it sets one bit in the mask of each of the two cells that share that corner. Each row is read four times and
-//!   the masks are written up to four times, and there is a branch for each bit: words of zeros cost next to nothing,
-//!   and noise costs most.
+//!   passes over the rows, one for each edge of a cell that runs along them. A pass looks at each bit of a word; where
+//!   it is set, it sets one bit in the mask of each of the two cells that share that corner. Each row is read four
+//!   times and the masks are written up to four times, and there is a branch for each bit: words of zeros cost next to
+//!   nothing, and noise costs most.
 //!
-//! Ours takes the copies from the first and the words from the second. A row of cells has four rows of corners, and their
-//! words are four of the eight copies; the other four are the same words shifted by one, with the lowest bit of the next
-//! word on top. Eight words with the corners of 64 cells become 64 bytes by a transposition of 8 × 64 bits. Each mask is
-//! written once, the rows are short enough to be read from the nearest cache when they come again, and there is no
-//! branch that depends on a bit: the grid may be of any size, and what is in it makes no difference to the time.
+//! Ours takes the copies from the first and the words from the second. A row of cells has four rows of corners, and
+//! their words are four of the eight copies; the other four are the same words shifted by one, with the lowest bit of
+//! the next word on top. Eight words with the corners of 64 cells become 64 bytes by a transposition of 8 × 64 bits.
+//! Each mask is written once, the rows are short enough to be read from the nearest cache when they come again, and
+//! there is no branch that depends on a bit: the grid may be of any size, and what is in it makes no difference to the
+//! time.
 
 use alloc::vec::Vec;
 
@@ -136,13 +137,10 @@ mod tests {
     use crate::Shape;
     use crate::cell::Corner;
 
-    /// A fair coin for each point.
+    /// A grid of random bits.
     fn grid(size: [u32; 3]) -> BitGrid {
-        let coin = |[x, y, z]: [u32; 3]| {
-            let hash = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ u64::from(z)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 63 == 1
-        };
-        BitGrid::from_fn(Shape::new(size).expect("no size is 0"), coin).expect("it is small")
+        let mut rng = fastrand::Rng::with_seed(1);
+        BitGrid::from_fn(Shape::new(size).expect("no size is 0"), |_| rng.bool()).expect("it is small")
     }
 
     /// Corner by corner.

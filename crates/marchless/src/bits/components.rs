@@ -39,10 +39,10 @@ pub struct Components {
     components: Vec<Component>,
 }
 
-/// What is known of a connected component.
+/// One connected component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Component {
-    /// How many points it has.
+    /// The number of its points.
     pub size: usize,
     /// The smallest region that holds it; coordinates that `i32` lacks become the highest one (it may then be empty).
     pub bounds: Region,
@@ -178,33 +178,33 @@ fn number(shape: Shape, runs: Runs, mut parents: Vec<usize>) -> Components {
 }
 
 impl Components {
-    /// How many there are.
+    /// The number of components.
     pub const fn len(&self) -> usize {
         self.components.len()
     }
 
-    /// Whether there is none: no point is set.
+    /// True if there is no component, since no point is set.
     pub const fn is_empty(&self) -> bool {
         self.components.is_empty()
     }
 
-    /// One of them, by its number.
+    /// The component of this number.
     pub fn get(&self, index: usize) -> Option<&Component> {
         self.components.get(index)
     }
 
-    /// All of them, by their numbers.
+    /// All components, in order of number.
     pub fn iter(&self) -> core::slice::Iter<'_, Component> {
         self.components.iter()
     }
 
-    /// The number of the one with the most points, of several the first; `None` where there is none.
+    /// The number of the largest component, and the first of several; `None` if there is no component.
     pub fn largest(&self) -> Option<usize> {
         let most = self.components.iter().map(|component| component.size).max()?;
         self.components.iter().position(|component| component.size == most)
     }
 
-    /// The number of the one that a point belongs to; `None` where the point is not set, or outside the grid.
+    /// The number of a point's component; `None` if the point is not set or lies outside the grid.
     pub fn label(&self, [x, y, z]: [u32; 3]) -> Option<usize> {
         let [_, ny, nz] = self.shape.size();
         if y >= ny || z >= nz {
@@ -216,8 +216,8 @@ impl Components {
         (run < behind && self.runs.spans[run][0] <= x).then(|| self.labels[run])
     }
 
-    /// The points of one of them, in a grid as large as the whole; nothing where there is none of that number. For many
-    /// of them at once, [`keep`](Self::keep) goes through the grid only once.
+    /// A grid of the same shape with the points of one component; empty if no component has that number. For many
+    /// components at once, [`keep`](Self::keep) visits the grid only once.
     pub fn mask(&self, index: usize) -> BitGrid {
         let mut grid = BitGrid::empty(self.shape);
         let Some(Component { bounds, .. }) = self.get(index) else { return grid };
@@ -235,7 +235,7 @@ impl Components {
         grid
     }
 
-    /// The points of those that `keep` says so of, in a grid as large as the whole.
+    /// A grid of the same shape with the points of the components for which `keep` returns true.
     pub fn keep(&self, keep: impl Fn(&Component) -> bool) -> BitGrid {
         let kept: Vec<bool> = self.components.iter().map(keep).collect();
         let mut grid = BitGrid::empty(self.shape);

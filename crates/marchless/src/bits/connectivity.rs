@@ -1,6 +1,6 @@
-//! Which points are neighbours.
+//! [`Connectivity`]: the neighbourhood of a point.
 
-/// Which of the 26 points around a point are its neighbours.
+/// The choice of neighbours among the 26 points around a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Connectivity {
     /// The 6 that share a face, of cubes around the points.

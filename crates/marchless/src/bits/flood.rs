@@ -9,11 +9,11 @@ use alloc::{collections::VecDeque, vec, vec::Vec};
 use super::{BitGrid, BitsError, Connectivity};
 
 impl BitGrid {
-    /// Fills from seeds: the set points that a way over set points leads to from some seed. The grid is the mask; seeds
-    /// that are not set fill nothing.
+    /// The set points that are connected to any seed through set points. The grid is the mask; seeds that are not set
+    /// fill nothing.
     ///
-    /// Rows are filled at once, which suits caves and terrain. Of a maze, whose ways come back to the same rows time and
-    /// again, [`components`](Self::components) takes far less time.
+    /// A step fills a whole row, which suits caves and terrain. The paths of a maze return to the same rows many times;
+    /// there, [`components`](Self::components) takes far less time.
     ///
     /// ```
     /// use marchless::{Shape, bits::{BitGrid, Connectivity}};

@@ -7,10 +7,10 @@ use crate::{
 };
 
 impl BitGrid {
-    /// Keeps the points that are set in `other`, too: the intersection.
+    /// Keeps the points that are also set in `other`: the intersection.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`]; the grid is then as it was.
+    /// [`BitsError::ShapesDiffer`]; the grid is then unchanged.
     pub fn and_with(&mut self, other: &Self) -> Result<(), BitsError> {
         self.combine(other, |word, other| word & other)
     }
@@ -18,28 +18,28 @@ impl BitGrid {
     /// Adds the points that are set in `other`: the union.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`]; the grid is then as it was.
+    /// [`BitsError::ShapesDiffer`]; the grid is then unchanged.
     pub fn or_with(&mut self, other: &Self) -> Result<(), BitsError> {
         self.combine(other, |word, other| word | other)
     }
 
-    /// Turns the points that are set in `other`: what remains are those set in one of the two.
+    /// Inverts the points that are set in `other`: the symmetric difference.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`]; the grid is then as it was.
+    /// [`BitsError::ShapesDiffer`]; the grid is then unchanged.
     pub fn xor_with(&mut self, other: &Self) -> Result<(), BitsError> {
         self.combine(other, |word, other| word ^ other)
     }
 
-    /// Takes away the points that are set in `other`: the difference.
+    /// Clears the points that are set in `other`: the difference.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`]; the grid is then as it was.
+    /// [`BitsError::ShapesDiffer`]; the grid is then unchanged.
     pub fn subtract(&mut self, other: &Self) -> Result<(), BitsError> {
         self.combine(other, |word, other| word & !other)
     }
 
-    /// Turns every point: the complement.
+    /// Inverts every point: the complement.
     pub fn invert(&mut self) {
         dispatch_words(Backend::fastest(), Invert { words: &mut self.words });
         self.clear_unused();
@@ -48,15 +48,15 @@ impl BitGrid {
     /// Makes the grid the same as `other`, in the memory that it has.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`]; the grid is then as it was.
+    /// [`BitsError::ShapesDiffer`]; the grid is then unchanged.
     pub fn copy_from(&mut self, other: &Self) -> Result<(), BitsError> {
         self.same_shape(other)?;
         self.words.copy_from_slice(&other.words);
         Ok(())
     }
 
-    /// The grid of the points in `region`, which may reach beyond this one: point `p` of it is point `region.min + p` of
-    /// this one. Points outside are zero.
+    /// The grid of the points in `region`, which may reach beyond this one: point `p` of it is point `region.min + p`
+    /// of this one. Points outside are zero.
     ///
     /// ```
     /// use marchless::{Region, Shape, bits::BitGrid};

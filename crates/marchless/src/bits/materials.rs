@@ -1,4 +1,4 @@
-//! [`MaterialGrid`]: more than two materials, and the boundary of any of them against the rest.
+//! [`MaterialGrid`]: a grid of more than two materials. It meshes the boundary of any of them against the rest.
 
 mod planes;
 mod selection;
@@ -15,8 +15,8 @@ use crate::{
 use planes::FillPlanes;
 use selection::{MaterialSet, Selection};
 
-/// One material of 4 to 256 for each lattice point, in 2 to 8 planes of bits: bit `k` of a point's material is its bit in
-/// plane `k`.
+/// One material of 4 to 256 for each lattice point, in 2 to 8 planes of bits: bit `k` of a point's material is its bit
+/// in plane `k`.
 ///
 /// ```
 /// use marchless::{MeshBuffer, Shape, bits::MaterialGrid};
@@ -46,7 +46,7 @@ impl MaterialGrid {
     /// A grid of material 0; `planes`: bits per point, 2 to 8.
     ///
     /// # Errors
-    /// [`BitsError::PlanesOutOfRange`], [`BitsError::TooLarge`] where memory does not hold it.
+    /// [`BitsError::PlanesOutOfRange`], [`BitsError::TooLarge`] if memory cannot hold it.
     pub fn new(shape: Shape, planes: u32) -> Result<Self, BitsError> {
         if !(2..=8).contains(&planes) {
             return Err(BitsError::PlanesOutOfRange { found: planes });
@@ -113,7 +113,7 @@ impl MaterialGrid {
         self.select_set(&materials.into_iter().collect())
     }
 
-    /// The same into a grid of the same shape, whose former content is dropped.
+    /// [`select`](Self::select) into an existing grid of the same shape, whose content is replaced.
     ///
     /// # Errors
     /// [`BitsError::ShapesDiffer`].
@@ -124,7 +124,8 @@ impl MaterialGrid {
     }
 
     /// Meshes the boundary of these materials against all others into `out`, whose former content is dropped, as
-    /// [`BitGrid::mesh`] does (up to 2²³ cells per axis); [`MeshBuffer::materials`] says which of them is inside at each vertex.
+    /// [`BitGrid::mesh`] does (up to 2²³ cells per axis); [`MeshBuffer::materials`] says which of them is inside at
+    /// each vertex.
     ///
     /// Where two materials touch, the boundaries of both have the same vertices, in the middle of the edges between
     /// them, bit for bit. (In cells where more than two meet, or where a material touches itself along an edge or

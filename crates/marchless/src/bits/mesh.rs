@@ -70,8 +70,8 @@ impl BitMesher {
         meshed
     }
 
-    /// Meshes `bits` into `out` like [`mesh`](Self::mesh), with the same triangles, and moves each vertex along its edge
-    /// to where `distance` is zero.
+    /// Meshes `bits` into `out` like [`mesh`](Self::mesh), with the same triangles, and moves each vertex along its
+    /// edge to where `distance` is zero.
     ///
     /// `distance` takes lattice coordinates (in cells from the first point, up to 1/8 beyond the outermost ones) and is
     /// negative inside. It need not be a true distance: only its zeros and, for normals, its gradient count. A vertex
@@ -79,10 +79,10 @@ impl BitMesher {
     /// for its normal, the direction of the gradient by differences of ±1/8. Smooth functions are met to within the
     /// rounding of `f32` positions; with any other, the vertex lies between two points with unlike signs.
     ///
-    /// Like all crossings, vertices keep 1/1024 of their edge away from its ends. Where the signs of `distance` at the ends
-    /// are not those of the bits (it is negative at the set one, and only there), or a value is not finite, the vertex
-    /// stays in the middle with the bits' normal; that normal also stays where there is no finite gradient other than
-    /// zero. So the surface is as sound as without placement, whatever `distance` is, up to 4,096 cells per axis.
+    /// Like all crossings, vertices keep 1/1024 of their edge away from its ends. Where the signs of `distance` at the
+    /// ends are not those of the bits (it is negative at the set one, and only there), or a value is not finite, the
+    /// vertex stays in the middle with the bits' normal; that normal also stays where there is no finite gradient other
+    /// than zero. So the surface is as sound as without placement, whatever `distance` is, up to 4,096 cells per axis.
     ///
     /// # Errors
     /// As [`mesh`](Self::mesh).

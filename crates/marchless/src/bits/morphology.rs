@@ -1,7 +1,7 @@
 //! Dilation, erosion, opening, closing.
 //!
-//! Two slabs at a time, from the lowest y to the highest, a row or a few short ones at once: what is joined along z stays
-//! in registers for two steps, until it has been joined along y, and at once along x.
+//! Two slabs at a time, from the lowest y to the highest, a row or a few short ones at once: what is joined along z
+//! stays in registers for two steps, until it has been joined along y, and at once along x.
 
 use core::array::from_fn;
 
@@ -9,7 +9,7 @@ use super::{BitGrid, BitsError, Connectivity};
 use crate::simd::{Backend, Eight, Job, Simd, Words, dispatch_words};
 
 impl BitGrid {
-    /// The points that are set or have a neighbour that is. Points outside are not set.
+    /// The points that are set or have a set neighbour. Points outside the grid count as not set.
     ///
     /// ```
     /// use marchless::{Shape, bits::{BitGrid, Connectivity}};
@@ -26,18 +26,18 @@ impl BitGrid {
         out
     }
 
-    /// [`dilated`](Self::dilated), into a grid that is there.
+    /// [`dilated`](Self::dilated) into an existing grid.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
+    /// [`BitsError::ShapesDiffer`] if `out` has another shape; it is then unchanged.
     pub fn dilate_into(&self, connectivity: Connectivity, out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
         spread(Backend::fastest(), self, connectivity, 0, out);
         Ok(())
     }
 
-    /// The points that are set together with all their neighbours. Points outside count as set: erosion is dilation of
-    /// what is not set.
+    /// The set points whose neighbours are all set. Points outside the grid count as set, so erosion is the dilation of
+    /// the complement.
     #[must_use]
     pub fn eroded(&self, connectivity: Connectivity) -> Self {
         let mut out = self.zeros();
@@ -45,25 +45,25 @@ impl BitGrid {
         out
     }
 
-    /// [`eroded`](Self::eroded), into a grid that is there.
+    /// [`eroded`](Self::eroded) into an existing grid.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
+    /// [`BitsError::ShapesDiffer`] if `out` has another shape; it is then unchanged.
     pub fn erode_into(&self, connectivity: Connectivity, out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
         spread(Backend::fastest(), self, connectivity, u64::MAX, out);
         Ok(())
     }
 
-    /// Eroded, then dilated: without what is too thin or too small to hold a point and all its neighbours. Nothing is
-    /// added.
+    /// The grid eroded, then dilated. This removes parts that are too thin or too small to hold a point and all its
+    /// neighbours, and adds nothing.
     #[must_use]
     pub fn opened(&self, connectivity: Connectivity) -> Self {
         self.eroded(connectivity).dilated(connectivity)
     }
 
-    /// Dilated, then eroded: with gaps closed that are too narrow or too small to hold a point and all its neighbours.
-    /// Nothing is taken away.
+    /// The grid dilated, then eroded. This closes gaps that are too narrow or too small to hold a point and all its
+    /// neighbours, and removes nothing.
     #[must_use]
     pub fn closed(&self, connectivity: Connectivity) -> Self {
         self.dilated(connectivity).eroded(connectivity)
@@ -293,11 +293,8 @@ mod tests {
     fn backends_agree() {
         for nx in [1, 63, 64, 65, 127, 128, 130, 250, 256, 320, 512, 513, 1000] {
             for ny in [1, 2, 3, 7, 8, 9] {
-                let noise = |[x, y, z]: [u32; 3]| {
-                    let mixed =
-                        (x ^ y.wrapping_mul(0x9e37_79b9) ^ z.wrapping_mul(0x85eb_ca6b)).wrapping_mul(0x2c1b_3c6d);
-                    (mixed ^ mixed >> 15).wrapping_mul(0x297a_2d39) >> 30 != 0
-                };
+                let mut rng = fastrand::Rng::with_seed(1);
+                let noise = |_| rng.u8(0..4) != 0;
                 let dense = BitGrid::from_fn(Shape::new([nx, ny, 1 + (nx + ny) % 4]).unwrap(), noise).unwrap();
                 let mut sparse = dense.clone();
                 sparse.invert();

@@ -1,16 +1,16 @@
-//! What a grid has in common with boxes, balls and other grids.
+//! Overlap tests of a grid with boxes, balls and other grids.
 
 use super::{BitGrid, paste::word_at, runs::span_words};
 use crate::{lattice::Region, math::sqrt_f64};
 
 impl BitGrid {
-    /// Whether some point of a region is set. Points outside the grid are not.
+    /// True if any point of a region is set. Points outside the grid are not set.
     pub fn overlaps_region(&self, region: Region) -> bool {
         let [x, y, z] = self.clipped(region);
         rows(y, z).any(|[y, z]| self.any_set(x, y, z))
     }
 
-    /// Whether all points of a region are set; so they are of an empty one. Points outside the grid are not set.
+    /// True if every point of a region is set; true for an empty region. Points outside the grid are not set.
     pub fn covers_region(&self, region: Region) -> bool {
         if region.is_empty() {
             return true;
@@ -20,7 +20,7 @@ impl BitGrid {
         inside && rows(y, z).all(|[y, z]| span_words(x).all(|(index, bits)| self.row(y, z)[index] & bits == bits))
     }
 
-    /// How many points of a region are set. Points outside the grid are not.
+    /// The number of set points in a region. Points outside the grid are not set.
     pub fn count_in(&self, region: Region) -> usize {
         let [x, y, z] = self.clipped(region);
         rows(y, z)
@@ -78,7 +78,7 @@ impl BitGrid {
         })
     }
 
-    /// Whether a row has a bit in a span.
+    /// True if a row has a set bit in a span.
     fn any_set(&self, span: [u32; 2], y: u32, z: u32) -> bool {
         let row = self.row(y, z);
         span_words(span).any(|(index, bits)| row[index] & bits != 0)

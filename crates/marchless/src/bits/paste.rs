@@ -4,8 +4,8 @@ use super::BitGrid;
 use crate::lattice::Region;
 
 impl BitGrid {
-    /// Copies all bits of another grid, zeros too: its point `p` becomes the point `p + offset`. What falls outside
-    /// this grid is left out.
+    /// Copies all bits of another grid, zeros included: its point `p` becomes the point `p + offset`. Points that fall
+    /// outside this grid are left out.
     ///
     /// ```
     /// use marchless::{Shape, bits::BitGrid};
@@ -25,7 +25,7 @@ impl BitGrid {
         }
     }
 
-    /// Gives all points of a box the same value. What of it lies outside the grid is left out.
+    /// Gives all points of a box the same value. Points outside the grid are left out.
     ///
     /// ```
     /// use marchless::{Region, Shape, bits::BitGrid};
@@ -59,8 +59,8 @@ impl BitGrid {
     }
 }
 
-/// Along each axis, where a box of that size and lowest point begins and ends in the grid; `None` where they have no point
-/// in common.
+/// Along each axis, where a box of that size and lowest point begins and ends in the grid; `None` where they have no
+/// point in common.
 fn spans(grid: &BitGrid, size: [u32; 3], min: [i64; 3]) -> Option<[(i64, i64); 3]> {
     let grid = grid.shape().size();
     let span = |axis: usize| (min[axis].max(0), (min[axis] + i64::from(size[axis])).min(i64::from(grid[axis])));
@@ -81,13 +81,10 @@ mod tests {
     use super::*;
     use crate::lattice::Shape;
 
-    /// A grid without a pattern.
+    /// A grid of random bits.
     fn noise(size: [u32; 3], seed: u32) -> BitGrid {
-        let bit = |[x, y, z]: [u32; 3]| {
-            let mixed = (x ^ y.wrapping_mul(0x9e37) ^ z.wrapping_mul(0x85eb_ca6b) ^ seed).wrapping_mul(0x2c1b_3c6d);
-            (mixed ^ mixed >> 15).wrapping_mul(0x297a_2d39) >> 31 == 1
-        };
-        BitGrid::from_fn(Shape::new(size).unwrap(), bit).unwrap()
+        let mut rng = fastrand::Rng::with_seed(seed.into());
+        BitGrid::from_fn(Shape::new(size).unwrap(), |_| rng.bool()).unwrap()
     }
 
     /// The point of a grid of `size` at `position - offset`, where there is one.

@@ -8,8 +8,8 @@ use super::{BitGrid, BitsError, pattern::Pattern};
 use crate::simd::{Backend, Job, Simd, Words, dispatch_words};
 
 impl BitGrid {
-    /// The grid with every set point moved by `offset`: point `p` of it is point `p - offset` of this one. Zeros come in
-    /// at the borders; what leaves the grid is lost.
+    /// The grid with every set point moved by `offset`: point `p` of it is point `p - offset` of this one. Zeros come
+    /// in at the borders; what leaves the grid is lost.
     ///
     /// ```
     /// use marchless::{Shape, bits::BitGrid};
@@ -27,10 +27,10 @@ impl BitGrid {
         out
     }
 
-    /// [`shifted`](Self::shifted), into a grid that is there.
+    /// [`shifted`](Self::shifted) into an existing grid.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`] where `out` has another shape; it is then as it was.
+    /// [`BitsError::ShapesDiffer`] if `out` has another shape; it is then unchanged.
     pub fn shift_into(&self, offset: [i32; 3], out: &mut Self) -> Result<(), BitsError> {
         self.same_shape(out)?;
         dispatch_words(Backend::fastest(), Shift { from: self, offset, out });

@@ -109,7 +109,7 @@ impl TileGrid {
     /// The tiles of a grid.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold them.
+    /// [`BitsError::TooLarge`] if memory cannot hold them.
     pub fn from_bits(grid: &BitGrid) -> Result<Self, BitsError> {
         let shape = grid.shape();
         let too_large = BitsError::TooLarge { shape };
@@ -130,7 +130,7 @@ impl TileGrid {
     /// The grid that the tiles were cut from.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold it.
+    /// [`BitsError::TooLarge`] if memory cannot hold it.
     pub fn to_bits(&self) -> Result<BitGrid, BitsError> {
         let mut grid = BitGrid::new(self.shape)?;
         let words_per_row = grid.words_per_row();

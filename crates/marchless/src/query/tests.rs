@@ -18,20 +18,16 @@ const BOUNDS: Region = Region::new([-1, -1, 0], [2, 1, 2]);
 /// A grid with balls added and dug, and some noise.
 fn grid(seed: u64, bounded: bool) -> Grid<i16> {
     let mut grid = if bounded { Grid::bounded(CELLS, BOUNDS) } else { Grid::new(CELLS) }.unwrap();
-    let mut state = seed | 1;
-    let mut next = move |end: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) % end
-    };
+    let mut rng = fastrand::Rng::with_seed(seed);
     for number in 0..9 {
-        let center = [0, 1, 2].map(|_| next(240) as f64 / 10.0 - 8.0);
-        let shape = QuantisedShape::sphere(center, next(60) as f64 / 10.0 + 1.0).unwrap();
+        let center = [0, 1, 2].map(|_| rng.f64() * 24.0 - 8.0);
+        let shape = QuantisedShape::sphere(center, rng.f64() * 6.0 + 1.0).unwrap();
         let operation = if number % 3 == 2 { Operation::Dig } else { Operation::Add };
         grid.apply(&QuantisedStamp::new(shape, operation, number));
     }
     for _ in 0..60 {
-        let point = [0, 1, 2].map(|_| next(8) as i32);
-        grid.set(point, Voxel::new(next(600) as i16 - 300, next(5) as u8)).unwrap();
+        let point = [0, 1, 2].map(|_| rng.i32(0..8));
+        grid.set(point, Voxel::new(rng.i16(-300..300), rng.u8(0..5))).unwrap();
     }
     grid
 }
@@ -71,7 +67,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The nearest triangle, its distance and the shares of its corners; `margin` is how far inside its edges the hit must be.
+/// The nearest triangle, its distance and the shares of its corners; `margin` is how far inside its edges the hit must
+/// be.
 fn brute_force(
     triangles: &[Triangle],
     origin: [f64; 3],
