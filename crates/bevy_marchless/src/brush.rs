@@ -1,4 +1,4 @@
-//! [`Stamp`] messages in, [`TerrainEdited`] messages out.
+//! [`Stamp`] messages change terrains; [`TerrainEdited`] messages report the changes.
 
 mod apply;
 
@@ -14,11 +14,14 @@ use marchless::BrushError;
 use crate::schedule::{MarchlessSystems, NewEdits, UpdatePhase};
 use crate::stats::count_update;
 
-/// One application of a brush to a terrain, asked for by a message.
+/// A message that applies a brush to a terrain once.
 ///
-/// It is rounded to 1/256 voxel as it is read and applied in integers from then on: the same stamps in the same order
-/// give the same samples, bit for bit, on any machine. What it changes shows in the same update where it is
-/// small ([`MarchlessSettings::max_inline_chunks`](crate::schedule::MarchlessSettings::max_inline_chunks)), updates later where it is not, and never in part.
+/// A stamp is rounded to 1/256 voxel when it is read, and applied in integers. The same stamps in the same order
+/// therefore give the same samples, bit for bit, on any machine.
+///
+/// A small change shows in the same update
+/// ([`MarchlessSettings::max_inline_chunks`](crate::schedule::MarchlessSettings::max_inline_chunks)), a larger one some
+/// updates later, but never in part.
 ///
 /// A stamp with numbers out of range, or for an entity without a terrain, is dropped with a warning.
 ///
@@ -36,42 +39,43 @@ use crate::stats::count_update;
 pub struct Stamp {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// Where.
+    /// The samples that the stamp affects.
     pub shape: BrushShape,
-    /// What.
+    /// The change to these samples.
     pub operation: BrushOperation,
-    /// What the samples that become solid or are painted are made of; digging does not use it.
+    /// The material of samples that become solid or are painted; digging ignores it.
     pub material: u8,
-    /// The part of a timed stroke that it is; `None`: the whole shape at once.
+    /// The part of a timed stroke that this stamp applies; `None` applies the whole shape at once.
     pub stroke: Option<Stroke>,
 }
 
 impl Stamp {
-    /// Makes the shape air.
+    /// A stamp that makes the shape air.
     pub const fn dig(terrain: Entity, shape: BrushShape) -> Self {
         Self { terrain, shape, operation: BrushOperation::Dig, material: 0, stroke: None }
     }
 
-    /// Makes the shape solid, of `material`.
+    /// A stamp that makes the shape solid, of `material`.
     pub const fn add(terrain: Entity, shape: BrushShape, material: u8) -> Self {
         Self { terrain, shape, operation: BrushOperation::Add, material, stroke: None }
     }
 
-    /// Gives the solid samples in the shape `material`.
+    /// A stamp that gives the solid samples in the shape `material`.
     pub const fn paint(terrain: Entity, shape: BrushShape, material: u8) -> Self {
         Self { terrain, shape, operation: BrushOperation::Paint, material, stroke: None }
     }
 
-    /// The same stamp as a part of a timed stroke; painting does not use it.
+    /// Makes the stamp a part of a timed stroke; painting ignores it.
     #[must_use]
     pub const fn with_stroke(self, stroke: Stroke) -> Self {
         Self { stroke: Some(stroke), ..self }
     }
 
-    /// The same stamp in lattice integers, on the surface at isovalue 0; the terrain's own counts where it is applied.
+    /// Converts the stamp to lattice integers, for the surface at isovalue 0. When a terrain applies a stamp, its own
+    /// isovalue counts.
     ///
     /// # Errors
-    /// [`BrushError`] about the first number out of range.
+    /// [`BrushError`] for the first number out of range.
     pub fn quantised(&self) -> Result<marchless::QuantisedStamp, BrushError> {
         let operation = match self.operation {
             BrushOperation::Add => marchless::Operation::Add,
@@ -86,32 +90,33 @@ impl Stamp {
     }
 }
 
-/// A shape in the terrain's lattice: all numbers in voxels, from the terrain's lowest corner
-/// ([`TerrainQuery::to_lattice`](crate::query::TerrainQuery::to_lattice) gives them). Positions are in double precision, so that a
-/// brush is as exact ten million voxels away as it is at the origin, and reach to 2³⁰ (a thousand million voxels) either way. Radii and
-/// half sizes lie above 0 and reach to 1,024.
+/// A shape in the terrain's lattice: all numbers are in voxels, from the lattice's origin
+/// ([`TerrainQuery::to_lattice`](crate::query::TerrainQuery::to_lattice) converts positions).
+///
+/// Positions are in double precision, so that a brush ten million voxels away is as exact as at the origin. They range
+/// to 2³⁰ (a thousand million voxels) either way. Radii and half sizes lie above 0 and range to 1,024.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 pub enum BrushShape {
     /// A ball.
     Sphere {
-        /// Its middle.
+        /// The ball's centre.
         center: DVec3,
-        /// Its radius.
+        /// The ball's radius.
         radius: f32,
     },
     /// A box along the lattice's axes.
     Box {
-        /// Its middle.
+        /// The box's centre.
         center: DVec3,
-        /// From the middle to the faces.
+        /// The distances from the centre to the faces.
         half_size: Vec3,
     },
-    /// What a ball sweeps on its way from one point to another, at most 2,048 voxels apart on each axis.
+    /// The volume that a ball sweeps between two points, at most 2,048 voxels apart on each axis.
     Capsule {
-        /// From here.
+        /// The first point.
         a: DVec3,
-        /// To here; may be the same point.
+        /// The second point; may equal the first.
         b: DVec3,
         /// The ball's radius.
         radius: f32,
@@ -119,17 +124,17 @@ pub enum BrushShape {
 }
 
 impl BrushShape {
-    /// A ball; in voxels.
+    /// A ball, in voxels.
     pub fn sphere(center: impl Into<DVec3>, radius: f32) -> Self {
         Self::Sphere { center: center.into(), radius }
     }
 
-    /// A box along the axes, from `center - half_size` to `center + half_size`; in voxels.
+    /// A box along the axes, from `center - half_size` to `center + half_size`, in voxels.
     pub fn cuboid(center: impl Into<DVec3>, half_size: Vec3) -> Self {
         Self::Box { center: center.into(), half_size }
     }
 
-    /// What a ball sweeps on its way from `a` to `b`; in voxels.
+    /// The volume that a ball sweeps between `a` and `b`, in voxels.
     pub fn capsule(a: impl Into<DVec3>, b: impl Into<DVec3>, radius: f32) -> Self {
         Self::Capsule { a: a.into(), b: b.into(), radius }
     }
@@ -147,34 +152,34 @@ impl BrushShape {
     }
 }
 
-/// What a stamp does to the samples of its shape.
+/// The change that a stamp makes to the samples in its shape.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Debug, PartialEq, Hash, Clone)]
 pub enum BrushOperation {
-    /// Makes solid.
+    /// Makes the samples solid.
     Add,
-    /// Makes air.
+    /// Makes the samples air.
     Dig,
-    /// Changes the material of what is solid.
+    /// Changes the material of solid samples.
     Paint,
 }
 
-/// The part of a timed stroke that a stamp applies: what a brush at a rate does from `start` to `end`.
+/// The part of a timed stroke that a stamp applies: the effect of a brush with a rate from `start` to `end`.
 ///
-/// Times are rounded down to microseconds and samples move by the difference of whole steps, so it makes no difference
-/// into how many stamps a stroke is cut, as long as each starts where the one before ends.
+/// Times are rounded down to microseconds, and samples move by differences of whole steps. A stroke therefore has the
+/// same effect however it is cut into stamps, as long as each stamp starts where the one before ends.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Debug, PartialEq, Clone)]
 pub struct Stroke {
-    /// Your number for the stroke; it has no effect on the samples.
+    /// A number of your choice for the stroke; it has no effect on the samples.
     pub id: u64,
-    /// How fast the surface moves where the falloff does not reach, in voxels per second; at most 65,536.
+    /// The speed of the surface inside of the falloff, in voxels per second; at most 65,536.
     pub rate: f32,
     /// The width of the rim within the shape over which the rate falls to 0, in voxels; at most 1,024.
     pub falloff: f32,
-    /// When the part begins, since the stroke began.
+    /// The start of the part, in time since the stroke began.
     pub start: Duration,
-    /// When it ends; not before it begins.
+    /// The end of the part; at or after `start`.
     pub end: Duration,
 }
 
@@ -184,10 +189,11 @@ impl Stroke {
     }
 }
 
-/// What the stamps of one update have changed of one region of a terrain; sent in the update that applied them.
+/// A message about the changes that one update's stamps made in one region of a terrain; sent in the update that
+/// applies them.
 ///
-/// Stamps whose chunks overlap are one region; of others, each has a message of its own.
-/// Stamps on chunks that are still being filled are reported when they take effect.
+/// Stamps whose chunks overlap share one message; every other stamp has its own. Stamps on chunks that are still being
+/// filled are reported when they take effect.
 #[derive(Message, Reflect, Clone, Debug, PartialEq, Eq)]
 #[reflect(Message, Debug, PartialEq, Clone)]
 pub struct TerrainEdited {
@@ -197,9 +203,9 @@ pub struct TerrainEdited {
     pub min: IVec3,
     /// One past the highest changed lattice point.
     pub max: IVec3,
-    /// What became solid: cubic voxels by the material that it has now.
+    /// The volume that became solid, in cubic voxels by its new material.
     pub added: BTreeMap<u8, u64>,
-    /// What became air: cubic voxels by the material that it was.
+    /// The volume that became air, in cubic voxels by its former material.
     pub removed: BTreeMap<u8, u64>,
 }
 

@@ -1,4 +1,4 @@
-//! Applies stamps to volumes, and reports what they have changed.
+//! Applies stamps to volumes and reports the changes.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::stats::{RequestTime, TerrainStats};
 use crate::terrain::TerrainVolume;
 use crate::volume::Edits;
 
-/// Stamps that have been read but not applied, in order.
+/// The stamps that are read but not yet applied, in order.
 #[derive(Resource, Default)]
 pub(super) struct StampQueue(Vec<Queued>);
 
@@ -22,8 +22,8 @@ struct Queued {
     terrain: Entity,
     stamp: marchless::QuantisedStamp,
     since: RequestTime,
-    /// For which of the worlds that the terrain was to be, and for the surface at which isovalue; known when its turn has
-    /// come once, so that it makes no difference how long it waits.
+    /// The terrain's request count and isovalue that the stamp is for. Set on the stamp's first turn, so that its wait
+    /// makes no difference.
     request: Option<(u64, f32)>,
 }
 
@@ -44,11 +44,11 @@ pub(super) fn read_stamps(
     new_edits.0 = queue.0.iter().any(|queued| queued.request.is_none());
 }
 
-/// Applies the queued stamps in order, and reports what they have changed; those whose chunks overlap become one set of
-/// chunks to be meshed.
+/// Applies the queued stamps in order and reports the changes. Stamps whose chunks overlap become one set of chunks to
+/// mesh.
 ///
-/// A stamp that needs samples that were dropped waits for them, and the terrain's stamps behind it wait with it; so do
-/// stamps on disabled terrains, and on those whose source is about to change or whose world's file is being read.
+/// A stamp waits for samples that were dropped, and the terrain's later stamps wait behind it. Stamps also wait while
+/// their terrain is disabled, while its source is about to change, and while its world's file is being read.
 pub(super) fn apply_stamps(
     mut queue: ResMut<StampQueue>,
     mut volumes: Query<(Entity, &mut TerrainVolume)>,

@@ -1,4 +1,4 @@
-//! Asks for the samples of chunks, in jobs, and takes them in.
+//! Queues sampling jobs for chunks and takes in their results.
 
 use bevy_ecs::prelude::*;
 use bevy_platform::time::Instant;
@@ -11,7 +11,7 @@ use crate::stats::TerrainStats;
 use crate::terrain::TerrainVolume;
 use crate::volume::Filled;
 
-/// Each update takes at least this many chunks of a terrain.
+/// The least number of sampled chunks that an update takes in per terrain, whatever the budget.
 const MIN_CHUNKS: usize = 4;
 
 /// Takes sampled chunks into their volumes, with the stamps that came before them.
@@ -39,7 +39,7 @@ pub(super) fn take_filled_chunks(
     budget.spend(start);
 }
 
-/// Asks for the samples of the chunks that wait for them, the most urgent first, as many as may be in flight.
+/// Queues sampling jobs for pending chunks, the most urgent first, up to the limit in flight.
 pub(super) fn ask_for_samples(
     mut volumes: Query<&mut TerrainVolume>,
     queue: Res<WorkQueue>,

@@ -1,4 +1,4 @@
-//! Finds what viewers see of each terrain, and lets chunks follow.
+//! Computes what viewers see of each terrain, and loads and unloads chunks accordingly.
 
 use core::time::Duration;
 
@@ -18,24 +18,25 @@ use crate::placement::{Placement, in_double_precision};
 use crate::stats::TerrainStats;
 use crate::terrain::{Terrain, TerrainVolume};
 
-/// A terrain that loads nothing by itself may wait this many updates for the first viewer, before a warning.
+/// The number of updates after which a terrain that loads nothing by itself and has had no viewer is reported.
 const PATIENCE: u32 = 120;
 
-/// What is known of the viewers of a terrain.
+/// The views of all viewers on one terrain.
 #[derive(Component, Default)]
 pub(super) struct TerrainViews {
-    /// The latest good view of each viewer, and the settings it was made from.
+    /// The latest valid view of each viewer, and the settings it was made from.
     views: EntityHashMap<(TerrainViewer, View)>,
-    /// What the views depend on besides the viewers.
+    /// The terrain's state from which the views were made.
     at: Option<TerrainState>,
-    /// The latest run in which the terrain was looked at.
+    /// The latest run of the system that visited the terrain.
     run: u64,
-    /// How many updates it has waited for the first viewer; stays at [`PATIENCE`], also once there has been one.
+    /// The number of updates without a viewer; stays at [`PATIENCE`] once reached or once there was a viewer.
     waited: u32,
 }
 
 impl TerrainViews {
-    /// Notes whether there are viewers. True once: when a terrain that loads nothing without any has waited too long.
+    /// Counts updates without a viewer. Returns true once: when a terrain that loads nothing by itself has waited
+    /// [`PATIENCE`] updates.
     fn has_waited_too_long(&mut self, there_are_viewers: bool, settings: &Terrain) -> bool {
         if there_are_viewers {
             self.waited = PATIENCE;
@@ -48,7 +49,7 @@ impl TerrainViews {
     }
 }
 
-/// Where a terrain is and what it is like: its generation, and how often its settings have changed.
+/// A terrain's transform, its generation, and how often its settings have changed.
 #[derive(Clone, Copy, PartialEq)]
 struct TerrainState {
     to_world: DAffine3,
@@ -56,13 +57,13 @@ struct TerrainState {
     changes: u64,
 }
 
-/// All viewers as they were in the latest update.
+/// The state of all viewers in the latest update.
 #[derive(Default)]
 pub(super) struct Viewers {
-    /// Counts the runs of the system.
+    /// The number of runs of the system.
     run: u64,
     seen: EntityHashMap<ViewerState>,
-    /// Those that have changed since the update before, and those that are gone.
+    /// The viewers that have changed since the update before; sorted.
     changed: Vec<Entity>,
     gone: Vec<Entity>,
 }
@@ -70,14 +71,14 @@ pub(super) struct Viewers {
 #[derive(Clone, Copy, PartialEq)]
 struct ViewerState {
     settings: TerrainViewer,
-    /// Where it is in this very update.
+    /// The transform in this update.
     now: Option<GlobalTransform>,
-    /// Where it was when transforms were last propagated, if they have been since it is there.
+    /// The transform at the last propagation; `None` if none has happened since the viewer was added.
     propagated: Option<GlobalTransform>,
 }
 
 impl Viewers {
-    fn look(&mut self, viewers: &Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>, transforms: &TransformHelper) {
+    fn update(&mut self, viewers: &Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>, transforms: &TransformHelper) {
         self.run += 1;
         self.changed.clear();
         self.gone.clear();
@@ -97,9 +98,9 @@ impl Viewers {
     }
 }
 
-/// Moves the views of all terrains with their viewers, and lets chunks follow as far as the update's time allows.
+/// Updates the views of all terrains, then loads and unloads chunks as far as the time budget allows.
 ///
-/// What has not changed since the update before is not looked at again.
+/// Viewers and terrains that have not changed since the update before are skipped.
 pub(super) fn follow_viewers(
     mut terrains: Query<(Entity, &mut TerrainVolume, &mut TerrainViews, Placement)>,
     viewers: Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>,
@@ -111,7 +112,7 @@ pub(super) fn follow_viewers(
     mut reported: Local<HashSet<(Entity, Entity)>>,
 ) {
     let start = Instant::now();
-    seen.look(&viewers, &transforms);
+    seen.update(&viewers, &transforms);
     if !reported.is_empty() {
         reported.retain(|(terrain, about)| {
             terrains.contains(*terrain) && (terrain == about || seen.seen.contains_key(about))
@@ -128,7 +129,7 @@ pub(super) fn follow_viewers(
                  add a `TerrainViewer` to the camera, or set `keep`"
             );
         }
-        // Where things are in this very update; in a floating space, where they were when transforms were last propagated.
+        // Transforms of this update; in a floating space, those of the last propagation.
         let to_world = if place.is_floating() {
             Some(place.to_world())
         } else {
@@ -136,7 +137,7 @@ pub(super) fn follow_viewers(
         };
         let (generation, changes) = (volume.heart().samples().generation(), volume.changes());
         let at = to_world.map(|to_world| TerrainState { to_world, generation, changes });
-        // While it was disabled, viewers may have moved.
+        // Viewers may have moved while the terrain was disabled.
         let was_away = core::mem::replace(&mut followed.run, seen.run) + 1 != seen.run;
         let all = was_away || at.is_none() || followed.at != at;
         if all || !seen.changed.is_empty() || !seen.gone.is_empty() {
@@ -149,7 +150,7 @@ pub(super) fn follow_viewers(
         }
         if volume.heart().has_to_follow() {
             let heart = volume.heart_mut();
-            // Noting what many moving viewers see must not stop what comes of it.
+            // Computing the views of many moving viewers must not use up the time for loading.
             heart.follow(until + seeing.saturating_sub(share / 4), &mut stats);
             for entity in heart.take_released() {
                 commands.entity(entity).try_despawn();
@@ -159,7 +160,7 @@ pub(super) fn follow_viewers(
     budget.spend(start);
 }
 
-/// Finding what viewers see of one terrain.
+/// Updates the views of one terrain.
 struct ViewOf<'a> {
     terrain: Entity,
     to_world: Option<DAffine3>,
@@ -169,7 +170,7 @@ struct ViewOf<'a> {
 }
 
 impl ViewOf<'_> {
-    /// Tells a terrain what the viewers see that have changed, or all of them.
+    /// Updates the views of changed viewers, or of all viewers if `all`.
     fn follow(&mut self, volume: &mut TerrainVolume, followed: &mut TerrainViews, all: bool) {
         for viewer in self.seen.gone.iter().filter(|viewer| followed.views.remove(*viewer).is_some()) {
             volume.heart_mut().set_view(Some(*viewer), None);
@@ -179,7 +180,7 @@ impl ViewOf<'_> {
             viewers = self.seen.seen.keys().copied().collect();
             viewers.sort_unstable();
             self.follow_kept(volume);
-            // Those that went while the terrain was not looked at.
+            // Viewers that disappeared while the terrain was not visited.
             let gone: Vec<Entity> =
                 followed.views.keys().copied().filter(|viewer| !self.seen.seen.contains_key(viewer)).collect();
             for viewer in gone {
@@ -197,7 +198,7 @@ impl ViewOf<'_> {
         }
     }
 
-    /// The chunks that the terrain keeps whoever looks.
+    /// Sets the view of the chunks that the terrain keeps loaded without a viewer.
     fn follow_kept(&self, volume: &mut TerrainVolume) {
         let Some(settings) = volume.settings() else { return };
         let (kept, extent) = (settings.kept_region(), settings.chunk_region());
@@ -205,7 +206,7 @@ impl ViewOf<'_> {
         volume.heart_mut().set_view(None, view);
     }
 
-    /// What a viewer sees, or what it saw, where that cannot be said.
+    /// The current view of a viewer, or its last valid one if the current one is invalid.
     fn view(
         &mut self,
         volume: &TerrainVolume,
@@ -215,9 +216,9 @@ impl ViewOf<'_> {
     ) -> Option<(TerrainViewer, View)> {
         let settings = volume.settings()?;
         let to_terrain = self.to_world.map(|to_world| to_world.inverse());
-        let mut look = ViewFinder { terrain: settings, to_terrain, reported: self.reported };
+        let mut finder = ViewFinder { terrain: settings, to_terrain, reported: self.reported };
         let place = if self.is_floating { seen.propagated } else { seen.now };
-        let view = place.and_then(|place| look.at(self.terrain, viewer, &seen.settings, &place, known));
+        let view = place.and_then(|place| finder.view(self.terrain, viewer, &seen.settings, &place, known));
         let as_before = || known.map(|(before, view)| (before, view.with_extent(settings.chunk_region())));
         view.map(|view| (seen.settings, view)).or_else(as_before)
     }
