@@ -13,7 +13,12 @@
 //! # use bevy_ecs::prelude::*;
 //! # use bevy_transform::components::Transform;
 //!
-//! Endless waves.
+//! fn setup(mut commands: Commands) {
+//!     // Endless waves.
+//!     commands.spawn(Terrain::endless(|[x, y, z]: [f64; 3]| y - 8.0 * (x * 0.05).sin() * (z * 0.04).cos()));
+//!     // A game adds a camera here.
+//!     commands.spawn((TerrainViewer::new(256.0).with_height(128.0), Transform::from_xyz(0.0, 20.0, 0.0)));
+//! }
 //! ```
 
 mod fill;

@@ -190,7 +190,7 @@ impl BitGrid {
         &self.words[self.row * (y as usize + self.shape.size()[1] as usize * z as usize)..][..self.row]
     }
 
-    /// All words, to be changed. Who leaves something in the unused bits of a row's last word must
+    /// All words, mutable. Callers must keep the unused bits of each row's last word zero, or
     /// [clear](Self::clear_unused) them.
     pub(crate) fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
@@ -247,7 +247,7 @@ pub enum BitsError {
     /// Memory cannot hold the grid.
     #[error("memory does not hold what a grid of {shape} bits takes")]
     TooLarge {
-        /// What was asked for.
+        /// The rejected shape.
         shape: Shape,
     },
     /// The padded samples consist of padding only.
@@ -259,7 +259,7 @@ pub enum BitsError {
     /// The isovalue must be finite.
     #[error("the isovalue must be finite, but it is {isovalue}")]
     IsovalueNotFinite {
-        /// What was given.
+        /// The rejected isovalue.
         isovalue: f32,
     },
     /// A cell needs two points on each axis.
@@ -279,7 +279,7 @@ pub enum BitsError {
     /// The grid has no such point.
     #[error("a grid of {shape} bits has no point {position:?}")]
     OutOfRange {
-        /// What was given.
+        /// The rejected position.
         position: [u32; 3],
         /// The grid's shape.
         shape: Shape,
@@ -287,19 +287,19 @@ pub enum BitsError {
     /// The region is empty, or has more points than can be counted.
     #[error("no grid has the size of the region from {:?} to {:?}", .region.min, .region.max)]
     RegionSize {
-        /// What was given.
+        /// The rejected region.
         region: Region,
     },
     /// A point has 26 neighbours at most.
     #[error("a rule counts up to 26 neighbours, but {count} was given")]
     NeighbourCount {
-        /// What was given.
+        /// The rejected count.
         count: u8,
     },
     /// Materials take 2 to 8 planes.
     #[error("materials take 2 to 8 planes, but {found} were asked for")]
     PlanesOutOfRange {
-        /// What was asked for.
+        /// The rejected number of planes.
         found: u32,
     },
     /// The materials do not fill the grid.
@@ -315,7 +315,7 @@ pub enum BitsError {
     /// A material's number has more bits than there are planes.
     #[error("{planes} planes hold materials below {}, but {material} was given for {position:?}", 1u32 << planes)]
     MaterialTooLarge {
-        /// What was given.
+        /// The rejected material.
         material: u8,
         /// For which point.
         position: [u32; 3],

@@ -178,7 +178,7 @@ fn above(sample: f64, iso: f64) -> f32 {
     rounded(sample - iso)
 }
 
-/// The same for an integer of up to 64 bits.
+/// The difference of an integer of up to 64 bits and the isovalue, rounded to `f32`.
 fn above_long(sample: i128, iso: f64) -> f32 {
     let whole = iso.floor();
     // No sample comes near the limits, within which differences are exact.

@@ -78,7 +78,11 @@ struct ViewerState {
 }
 
 impl Viewers {
-    fn update(&mut self, viewers: &Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>, transforms: &TransformHelper) {
+    fn update(
+        &mut self,
+        viewers: &Query<(Entity, &TerrainViewer, Ref<GlobalTransform>)>,
+        transforms: &TransformHelper,
+    ) {
         self.run += 1;
         self.changed.clear();
         self.gone.clear();

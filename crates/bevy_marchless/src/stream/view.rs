@@ -1,4 +1,4 @@
-//! [`ViewFinder`]: what a viewer sees of a terrain.
+//! [`ViewFinder`]: computes a viewer's view of a terrain.
 
 use bevy_ecs::prelude::*;
 use bevy_math::{DAffine3, Vec3};
@@ -9,24 +9,24 @@ use super::TerrainViewer;
 use crate::cover::{LoadRegion, View};
 use crate::terrain::Terrain;
 
-/// Viewers' positions are rounded to this part of a chunk, so that small steps change nothing.
+/// Positions of viewers are rounded to this part of a chunk, so that small steps change nothing.
 const STEP: f64 = 1.0 / 8.0;
-/// No viewer sees farther, in voxels.
+/// The longest viewing distance, in voxels.
 const FARTHEST: f64 = 1e9;
 
-/// Finding the ranges around one terrain's viewers.
+/// Computes the load regions of one terrain's viewers.
 pub(super) struct ViewFinder<'a> {
     pub(super) terrain: &'a Terrain,
-    /// From world space to the terrain's own.
+    /// The transform from world space to the terrain's own; `None` if it could not be computed.
     pub(super) to_terrain: Option<DAffine3>,
-    /// What has been warned of: terrains, and whom of theirs.
+    /// The warnings given: pairs of a terrain and the viewer concerned, or the terrain itself.
     pub(super) reported: &'a mut HashSet<(Entity, Entity)>,
 }
 
 impl ViewFinder<'_> {
-    /// What a viewer sees of the terrain; `None` where that cannot be said. `known`: its latest view, and what that was
-    /// made from.
-    pub(super) fn at(
+    /// The view of a viewer; `None`, with a warning, if the settings or transforms are invalid. `known`: its latest view,
+    /// and the settings that it was made from.
+    pub(super) fn view(
         &mut self,
         terrain: Entity,
         viewer: Entity,
@@ -44,7 +44,7 @@ impl ViewFinder<'_> {
         let [margin, samples] = [settings.margin, settings.sample_radius].map(|v| f64::from(v) / cells);
         let middle = at.map(|v| (v / STEP).round() * STEP);
         let extent = self.terrain.chunk_region();
-        // In steps, so that looking around changes little.
+        // Rounded to halves, so that turning the viewer changes little.
         let forward = place.affine().transform_vector3(Vec3::NEG_Z).as_dvec3();
         let forward = to_terrain.transform_vector3(forward).normalize_or_zero();
         let forward = (forward * 2.0).round().to_array();
@@ -57,7 +57,7 @@ impl ViewFinder<'_> {
         let range = limited(whole);
         self.note_scaled_radii(terrain, viewer, settings, range != whole);
         let margin = limited_margin(&range, margin);
-        // Where all that may be loaded lies within, none are dropped.
+        // Nothing is dropped if the sample radius covers everything that may be loaded.
         let drops = samples < range.longest() + margin + 2.0;
         let samples = drops.then(|| LoadRegion::ellipsoid(middle, [samples + STEP; 3], extent));
         Some(View::new(range, margin, samples, forward))
@@ -92,7 +92,7 @@ impl ViewFinder<'_> {
             return None;
         }
         let TerrainViewer { radii, margin, sample_radius } = *settings;
-        // NaN is not above 0 either.
+        // Comparisons with NaN are false, so NaN is refused here, too.
         if !(radii.to_array().iter().all(|radius| *radius > 0.0) && margin >= 0.0 && sample_radius >= 0.0) {
             self.warn(terrain, viewer, || {
                 format!(
@@ -127,9 +127,9 @@ impl ViewFinder<'_> {
     }
 }
 
-/// The range, made smaller until it has no more chunks than may be loaded.
+/// Shrinks a region until it has at most [`Terrain::MAX_CHUNKS`] chunks.
 fn limited(mut range: LoadRegion) -> LoadRegion {
-    // First by the box around it: rows of a huge range would take too long to count.
+    // The bounding box comes first: counting the rows of a huge region would take too long.
     while range.box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {
         range = range.shrunk(0.9);
     }
@@ -139,7 +139,7 @@ fn limited(mut range: LoadRegion) -> LoadRegion {
     range
 }
 
-/// The margin, made smaller until the range with it has no more than a few times the chunks that may be loaded.
+/// Shrinks a margin until the region and the margin fit into a box of 4 × [`Terrain::MAX_CHUNKS`] chunks.
 fn limited_margin(range: &LoadRegion, margin: f64) -> f64 {
     let mut margin = margin.min(FARTHEST);
     while margin > 0.1 && range.widened(margin).box_size() > 4.0 * Terrain::MAX_CHUNKS as f64 {

@@ -239,7 +239,7 @@ fn block(plane: &[u64], at: usize) -> &[u64; BLOCK] {
     plane[at..].first_chunk().expect("planes go on for a block behind their last row")
 }
 
-/// The same words of all planes.
+/// One range of words of each of the four planes.
 #[inline(always)]
 fn parts(planes: &mut [Vec<u64>; 4], words: Range<usize>) -> [&mut [u64]; 4] {
     let [a, b, c, d] = planes;
