@@ -1,5 +1,5 @@
-//! [`Cover`]: from viewers to the chunks that are wanted, and what differs from before. Pure: it knows no entity but as a
-//! viewer's id, and holds no chunk.
+//! [`Cover`]: turns viewers into wanted chunks, and reports what differs from before. It is pure: it knows entities only as
+//! the ids of viewers, and holds no chunk.
 
 mod load_region;
 mod queue;
@@ -15,19 +15,19 @@ pub(crate) use load_region::{LoadRegion, View};
 pub(crate) use queue::{ChunkQueue, UniqueQueue};
 use rows::Borders;
 
-/// What a terrain shows at one place: one piece of its cover.
+/// One leaf of a terrain's cover: a place, and what is shown there.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Debug, PartialEq, Hash, Clone)]
 pub struct Leaf {
-    /// The level of detail; 0 is the finest, and at present there is no other.
+    /// The level of detail; 0 is the finest, and at present the only one.
     pub level: u8,
-    /// The chunk's place, in chunks of this level.
+    /// The chunk's position, in chunks of this level.
     pub position: IVec3,
-    /// What is shown of it.
+    /// The state of the leaf.
     pub state: LeafState,
 }
 
-/// What is shown of a leaf.
+/// How far a leaf is from being shown.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Debug, PartialEq, Hash, Clone)]
 pub enum LeafState {
@@ -39,19 +39,19 @@ pub enum LeafState {
     Drawn,
 }
 
-/// How many leaves of each state a terrain has.
+/// The numbers of a terrain's leaves in each state.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, PartialEq, Hash, Clone)]
 pub struct Coverage {
-    /// See [`LeafState::Waiting`].
+    /// Leaves that are [`LeafState::Waiting`].
     pub waiting: usize,
-    /// See [`LeafState::Empty`].
+    /// Leaves that are [`LeafState::Empty`].
     pub empty: usize,
-    /// See [`LeafState::Drawn`].
+    /// Leaves that are [`LeafState::Drawn`].
     pub drawn: usize,
 }
 
-/// What viewers ask of a chunk.
+/// The part of a chunk that viewers need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Residency {
     /// Nothing.
@@ -62,52 +62,52 @@ pub(crate) enum Residency {
     Mesh,
 }
 
-/// Who asks for chunks: a viewer's entity, or `None` for what the terrain keeps whoever looks.
+/// The owner of a view: a viewer's entity, or `None` for the chunks that the terrain always keeps.
 pub(crate) type ViewId = Option<Entity>;
 
-/// What all viewers of one terrain see.
+/// The views of all viewers of one terrain.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cover {
     views: BTreeMap<ViewId, TrackedView>,
-    /// Those that are revealed in part.
+    /// The views that are only partly revealed.
     partial: BTreeSet<ViewId>,
-    /// Whether some view has ever asked that samples are dropped: they have to come back some time.
+    /// Whether any view has ever allowed samples to be dropped: dropped samples have to come back some time.
     drops: bool,
 }
 
-/// A view, and how much of it has been told.
+/// A view, and the part of it that has been reported.
 #[derive(Clone, Debug)]
 struct TrackedView {
     view: View,
     borders: Borders,
-    /// So large a part of its radii has been told, from the middle on: 0 at first, 1 for all.
+    /// The part of its radii that has been reported, from the middle outwards: 0 at first, 1 for all.
     revealed: f64,
-    /// How many chunks have not been told.
+    /// The number of chunks that have not been reported.
     hidden: usize,
 }
 
 impl TrackedView {
-    /// The borders of what has been told.
+    /// The borders of the reported part.
     fn told(&self) -> Borders {
         if self.revealed > 0.0 { Borders::of(&self.view.within(self.revealed)) } else { Borders::default() }
     }
 }
 
 impl Cover {
-    /// What one viewer sees.
+    /// The view of one viewer.
     pub(crate) fn view(&self, id: ViewId) -> Option<&View> {
         Some(&self.views.get(&id)?.view)
     }
 
-    /// Whether samples that are not needed for now may be dropped.
+    /// Whether samples that nothing needs at present may be dropped.
     pub(crate) const fn drops_samples(&self) -> bool {
         self.drops
     }
 
-    /// Changes what one viewer sees; `None`: it is gone. `come` is told the chunks that may now be wanted more than
-    /// before, and how much of them, `go` those that may be wanted less, and how much of them at most; some of them twice.
+    /// Changes the view of one viewer; `None` removes it. `come` receives the chunks that may now be wanted more than
+    /// before, and how much of them; `go` receives those that may be wanted less, and how much at most. Some come twice.
     ///
-    /// Of a view that is new or differs a lot, nothing comes before it is [revealed](Self::reveal) ring by ring: it may
+    /// Nothing of a view that is new or differs a lot comes before it is [revealed](Self::reveal) ring by ring: it may
     /// have any number of chunks.
     pub(crate) fn set(
         &mut self,
@@ -154,17 +154,17 @@ impl Cover {
         self.views.insert(id, TrackedView { view, borders, revealed, hidden });
     }
 
-    /// Whether all has been told of what viewers ask for.
+    /// Whether everything in the views has been reported.
     pub(crate) fn is_revealed(&self) -> bool {
         self.partial.is_empty()
     }
 
-    /// The views that are revealed in part.
+    /// The views that are only partly revealed.
     pub(crate) fn partial(&self) -> impl Iterator<Item = ViewId> + '_ {
         self.partial.iter().copied()
     }
 
-    /// Tells one ring more of a view that is revealed in part.
+    /// Reports one more ring of a view that is only partly revealed.
     pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Residency)) {
         let Some(watched) = self.views.get_mut(&id) else { return };
         let before = watched.told();
@@ -180,12 +180,12 @@ impl Cover {
         }
     }
 
-    /// How many chunks viewers may ask for that have not been told.
+    /// An upper bound of the number of chunks in the views that have not been reported.
     pub(crate) fn hidden(&self) -> usize {
         self.partial.iter().filter_map(|id| Some(self.views.get(id)?.hidden)).sum()
     }
 
-    /// The chunks in range that have not been told.
+    /// The chunks in range that have not been reported.
     pub(crate) fn hidden_in_range(&self, mut take: impl FnMut([i32; 3])) {
         for watched in self.partial.iter().filter_map(|id| self.views.get(id)) {
             watched.borders.come(&watched.told(), |position, wanted| {
@@ -196,12 +196,12 @@ impl Cover {
         }
     }
 
-    /// Whether a chunk is in range: to be drawn as soon as it can be.
+    /// Whether a chunk is in range, so that it is drawn as soon as possible.
     pub(crate) fn contains(&self, position: [i32; 3]) -> bool {
         self.near(position).any(|view| view.range.grown(0.0).contains(position))
     }
 
-    /// What is asked of a chunk of which there is `now` so much. What a viewer's margin keeps is what is there.
+    /// The residency that the views ask for, for a chunk that has residency `now`. A viewer's margin keeps what is there.
     pub(crate) fn wanted(&self, position: [i32; 3], now: Residency) -> Residency {
         let asked = self.near(position).map(|view| {
             let grown = |by: f64| view.range.grown(by).contains(position);
@@ -217,7 +217,7 @@ impl Cover {
         asked.max().unwrap_or(Residency::Gone)
     }
 
-    /// Whether samples are to be there, where they have been dropped.
+    /// Whether a chunk's dropped samples should be sampled again.
     pub(crate) fn wants_samples(&self, position: [i32; 3]) -> bool {
         self.near(position).any(|view| match view.samples {
             Some(range) => range.grown(0.0).contains(position),
@@ -225,7 +225,7 @@ impl Cover {
         })
     }
 
-    /// Whether samples that are there may be dropped.
+    /// Whether a chunk's samples may be dropped.
     pub(crate) fn may_drop_samples(&self, position: [i32; 3]) -> bool {
         !self.near(position).any(|view| match view.samples {
             Some(range) => range.widened(view.margin).grown(0.0).contains(position),
@@ -233,24 +233,24 @@ impl Cover {
         })
     }
 
-    /// The viewer to which a chunk matters most, and how urgent it is there: the lower, the sooner.
+    /// The viewer for which a chunk is most urgent, and its urgency there: lower comes sooner.
     pub(crate) fn most_urgent(&self, position: [i32; 3]) -> Option<(ViewId, u32)> {
         let views = self.views.iter().map(|(id, watched)| (id, &watched.view));
         let near = views.filter(|(_, view)| view.bounds().contains(position));
         near.map(|(id, view)| (*id, view.urgency(position))).min_by_key(|(_, urgency)| *urgency)
     }
 
-    /// How urgent a chunk is for whoever sees it best: the lower, the sooner.
+    /// The urgency of a chunk for the viewer that sees it best: lower comes sooner.
     pub(crate) fn urgency(&self, position: [i32; 3]) -> u32 {
         self.most_urgent(position).map_or(u32::MAX, |(_, urgency)| urgency)
     }
 
-    /// How many chunks all viewers ask for together, or more where they see the same.
+    /// An upper bound of the number of chunks in all views together; exact where views do not overlap.
     pub(crate) fn size(&self) -> f64 {
         self.views.values().map(|watched| watched.view.range.box_size()).sum()
     }
 
-    /// The views that may ask anything of a chunk.
+    /// The views that may ask for anything of a chunk.
     fn near(&self, position: [i32; 3]) -> impl Iterator<Item = &View> + '_ {
         self.views.values().map(|watched| &watched.view).filter(move |view| view.bounds().contains(position))
     }
@@ -267,7 +267,7 @@ mod tests {
 
     const EXTENT: Region = Region { min: [-6, -4, -9], max: [7, 3, 9] };
 
-    /// What a viewer is like: its place, its radii, its margin and within which radius samples stay.
+    /// A viewer: its position, its radii, its margin and its sample radius.
     #[derive(Clone, Copy, Debug)]
     struct Viewer {
         middle: [f64; 3],
@@ -297,7 +297,7 @@ mod tests {
             .prop_map(|((middle, radii), is_box, margin, samples)| Viewer { middle, radii, is_box, margin, samples })
     }
 
-    /// What happens to a viewer.
+    /// A change of one viewer.
     #[derive(Clone, Debug)]
     enum Step {
         Becomes(Viewer),
@@ -310,13 +310,13 @@ mod tests {
         prop_oneof![3 => viewer().prop_map(Step::Becomes), 6 => moves.prop_map(Step::Moves), 1 => Just(Step::Goes)]
     }
 
-    /// Chunks that follow what they are told, as a terrain's do.
+    /// Chunks that follow the cover's reports, as a terrain's do.
     #[derive(Default)]
     struct Followers {
         there: BTreeMap<[i32; 3], Residency>,
-        /// Those that are to be looked at.
+        /// The chunks to be looked at.
         told: BTreeSet<[i32; 3]>,
-        /// Those whose samples have been asked for since they may have been dropped.
+        /// The chunks whose samples were wanted again after they may have been dropped.
         sampled: BTreeSet<[i32; 3]>,
     }
 

@@ -6,24 +6,24 @@ use marchless::Region;
 
 use super::rows::Rows;
 
-/// A view is revealed in this many rings at most.
+/// The most rings in which a view is revealed.
 const MOST_RINGS: u32 = 64;
 
-/// Chunks: a box, or those that an ellipsoid reaches.
+/// A set of chunks: a box, or all chunks that an ellipsoid touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LoadRegion {
-    /// The middle, in chunks from the lattice's origin. For a box, half way between its corners.
+    /// The middle, in chunks from the lattice's origin. A box's middle lies half way between its corners.
     middle: [f64; 3],
-    /// Half of its axes, in chunks.
+    /// The half axes, in chunks.
     radii: [f64; 3],
-    /// Whether it is a box instead of an ellipsoid.
+    /// Whether the region is a box instead of an ellipsoid.
     is_box: bool,
-    /// What there is at all.
+    /// The chunks that exist at all.
     extent: Region,
 }
 
 impl LoadRegion {
-    /// The chunks of `extent` of which some point lies in the ellipsoid.
+    /// The chunks of `extent` that the ellipsoid touches.
     pub(crate) fn ellipsoid(middle: [f64; 3], radii: [f64; 3], extent: Region) -> Self {
         Self { middle, radii, is_box: false, extent }
     }
@@ -32,26 +32,26 @@ impl LoadRegion {
     pub(crate) fn of_box(chunks: Region, extent: Region) -> Self {
         let ends = |axis: usize| [f64::from(chunks.min[axis]), f64::from(chunks.max[axis])];
         let middle = [0, 1, 2].map(|axis| (ends(axis)[0] + ends(axis)[1]) / 2.0);
-        // A little less than half, so that the chunks that only touch it are not in it.
+        // A little less than half, so that chunks that only touch the box do not belong to it.
         let radii = [0, 1, 2].map(|axis| (ends(axis)[1] - ends(axis)[0]) / 2.0 - 0.25);
         Self { middle, radii, is_box: true, extent: if chunks.is_empty() { chunks } else { extent } }
     }
 
-    /// The range with every chunk at most `chunks` away from one of its own, per axis.
+    /// The region together with every chunk at most `chunks` away from it along each axis.
     ///
-    /// That is exact for the ellipsoid, too: of a chunk's neighbours, the one that is nearest along each axis is a neighbour.
+    /// This is exact for the ellipsoid, too: of a chunk's neighbours, the one that is nearest along each axis is a neighbour.
     #[must_use]
     pub(crate) fn grown(self, chunks: f64) -> GrownLoadRegion {
         GrownLoadRegion { range: self, by: chunks }
     }
 
-    /// The same range, wider by so many chunks.
+    /// The region with all half axes longer by `chunks`.
     #[must_use]
     pub(crate) fn widened(self, chunks: f64) -> Self {
         if self.is_box { self } else { Self { radii: self.radii.map(|radius| radius + chunks), ..self } }
     }
 
-    /// Half of the longest axis, in chunks.
+    /// The longest half axis, in chunks.
     pub(crate) fn longest(&self) -> f64 {
         self.radii.into_iter().fold(0.0, f64::max)
     }
@@ -64,25 +64,25 @@ impl LoadRegion {
         self.extent
     }
 
-    /// How many chunks the box around it has, or a little more.
+    /// The number of chunks in the bounding box, or slightly more.
     pub(crate) fn box_size(&self) -> f64 {
         let size = self.extent.size();
         (0..3).map(|axis| (2.0 * self.radii[axis] + 2.0).min(f64::from(size[axis]))).product()
     }
 
-    /// The same range, with its axes so many times as long.
+    /// The region with its half axes scaled by a factor.
     #[must_use]
     pub(crate) fn shrunk(self, factor: f64) -> Self {
         Self { radii: self.radii.map(|radius| radius * factor), ..self }
     }
 
-    /// From the middle to a chunk's middle, in chunks.
+    /// The vector from the middle to a chunk's middle, in chunks.
     pub(crate) fn offset(&self, position: [i32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| f64::from(position[axis]) + 0.5 - self.middle[axis])
     }
 }
 
-/// A [`LoadRegion`] grown by some chunks.
+/// A [`LoadRegion`] grown by a number of chunks on all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GrownLoadRegion {
     range: LoadRegion,
@@ -95,25 +95,25 @@ impl GrownLoadRegion {
         self.range.extent.contains(position) && self.row(y, z).contains(&x)
     }
 
-    /// A box around the chunks.
+    /// The bounding box of the chunks.
     fn bounds(&self) -> Region {
         let reach = [0, 1, 2].map(|axis| self.reach(axis, self.range.radii[axis]));
         Region::new(reach.each_ref().map(|reach| reach.start), reach.each_ref().map(|reach| reach.end))
     }
 
-    /// How many chunks there are.
+    /// The number of chunks.
     pub(crate) fn len(&self) -> u64 {
         self.rows().iter().map(|(.., row)| row.len() as u64).sum()
     }
 
-    /// Which chunks of a row belong to it.
+    /// The chunks of one row that belong to the region.
     fn row(&self, y: i32, z: i32) -> ops::Range<i32> {
         let extent = &self.range.extent;
         let is_there = |axis: usize, position: i32| (extent.min[axis]..extent.max[axis]).contains(&position);
         if is_there(1, y) && is_there(2, z) { self.row_at(self.square(1, y), self.square(2, z)) } else { 0..0 }
     }
 
-    /// The same, from the squares of how far the row lies along y and z.
+    /// The chunks of a row, given the squared distances of the row along y and z, in radii.
     fn row_at(&self, y: f64, z: f64) -> ops::Range<i32> {
         let left = match self.range.is_box {
             true if y <= 1.0 && z <= 1.0 => 1.0,
@@ -123,7 +123,7 @@ impl GrownLoadRegion {
         if left < 0.0 { 0..0 } else { self.reach(0, self.range.radii[0] * left.sqrt()) }
     }
 
-    /// The square of how far the points of a chunk that are nearest to the middle lie from it along an axis, in radii.
+    /// The squared distance from the middle to the nearest point of a chunk along one axis, in radii.
     fn square(&self, axis: usize, position: i32) -> f64 {
         let low = f64::from(position) - self.by;
         let middle = self.range.middle[axis];
@@ -131,7 +131,7 @@ impl GrownLoadRegion {
         beyond * beyond
     }
 
-    /// All its chunks, row by row.
+    /// All chunks of the region, row by row.
     pub(super) fn rows(&self) -> Rows {
         let reach = |axis: usize| self.reach(axis, self.range.radii[axis]);
         let squares = |axis: usize| reach(axis).map(|position| self.square(axis, position)).collect::<Vec<_>>();
@@ -143,7 +143,7 @@ impl GrownLoadRegion {
         Rows::new(from, y_squares.len(), spans)
     }
 
-    /// The positions along an axis of chunks that come as near as `radius` to the middle.
+    /// The positions along an axis of chunks that come within `radius` of the middle.
     fn reach(&self, axis: usize, radius: f64) -> ops::Range<i32> {
         let (middle, extent) = (self.range.middle[axis], &self.range.extent);
         let from = floor(-(middle - radius - 1.0 - self.by)).saturating_neg();
@@ -153,23 +153,23 @@ impl GrownLoadRegion {
     }
 }
 
-/// The greatest integer that is not greater, saturating. Without SSE4.1 [`f64::floor`] is a call, and ranges have many rows.
+/// The floor of a number, saturating. Without SSE4.1 [`f64::floor`] is a function call, and regions have many rows.
 fn floor(value: f64) -> i32 {
     let towards_zero = value as i32;
     towards_zero.saturating_sub((f64::from(towards_zero) > value).into())
 }
 
-/// What one viewer sees, and what of it stays.
+/// A viewer's view of a terrain: the chunks to load, and those that stay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
     pub(crate) range: LoadRegion,
-    /// How many chunks farther away chunks stay.
+    /// The extra distance at which drawn chunks are unloaded, in chunks.
     pub(crate) margin: f64,
-    /// Within this range samples stay; `None`: everywhere.
+    /// The region in which samples stay; `None`: everywhere.
     pub(crate) samples: Option<LoadRegion>,
-    /// Where it looks, in the terrain's space; zero where that is not known.
+    /// The viewing direction in the terrain's space; zero where it is not known.
     pub(crate) forward: [f64; 3],
-    /// A box around all that it asks for.
+    /// The bounding box of everything in the view.
     bounds: Region,
 }
 
@@ -181,36 +181,36 @@ impl View {
         Self { range, margin, samples, forward, bounds }
     }
 
-    /// The same view of a terrain with another extent.
+    /// The view of a terrain with another extent.
     #[must_use]
     pub(crate) fn with_extent(self, extent: Region) -> Self {
         let of = |range: LoadRegion| LoadRegion { extent, ..range };
         Self::new(of(self.range), self.margin, self.samples.map(of), self.forward)
     }
 
-    /// The same view, looking elsewhere.
+    /// The view with another viewing direction.
     #[must_use]
     pub(crate) const fn facing(self, forward: [f64; 3]) -> Self {
         Self { forward, ..self }
     }
 
-    /// A box around all that it asks for.
+    /// The bounding box of everything in the view.
     pub(crate) const fn bounds(&self) -> Region {
         self.bounds
     }
 
-    /// Where chunks stay that are drawn.
+    /// The region in which drawn chunks stay.
     pub(crate) fn with_margin(&self) -> LoadRegion {
         self.range.widened(self.margin)
     }
 
-    /// How urgent a chunk is: the lower, the sooner. Near before far, and in front before behind. Where the ellipsoid's
-    /// axes are not equal, distances are scaled to the longest.
+    /// The urgency of a chunk: lower comes sooner. Near chunks come before far ones, and chunks in front before those
+    /// behind. Where the ellipsoid's axes differ, distances are scaled to the longest.
     pub(crate) fn urgency(&self, position: [i32; 3]) -> u32 {
         self.urgencies()(position)
     }
 
-    /// [`urgency`](Self::urgency), for many chunks.
+    /// The [`urgency`](Self::urgency) of chunks, as a function to call for many of them.
     pub(crate) fn urgencies(&self) -> impl Fn([i32; 3]) -> u32 + use<> {
         let Self { range, forward, .. } = *self;
         let scale = range.radii.map(|radius| range.longest() / radius.max(1e-9));
@@ -218,26 +218,26 @@ impl View {
             let offset = range.offset(position);
             let distance: f64 = (0..3).map(|axis| (offset[axis] * scale[axis]).powi(2)).sum();
             let ahead: f64 = (0..3).map(|axis| offset[axis] * forward[axis]).sum();
-            // What is close may be turned to in no time.
+            // The viewer may turn to close chunks at any moment.
             (16.0 * if ahead < 0.0 && distance > 4.0 { 2.0 * distance } else { distance }) as u32
         }
     }
 
-    /// The same view with so large a part of its radii.
+    /// The view with its radii scaled down to a part of them.
     #[must_use]
     pub(super) fn within(&self, part: f64) -> Self {
         let samples = self.samples.map(|samples| samples.shrunk(part));
         Self::new(self.range.shrunk(part), self.margin, samples, self.forward)
     }
 
-    /// The part of its radii that reaches about a chunk farther than `part`; 1: to the end of all that there is of it.
+    /// The part of the radii that reaches about a chunk farther than `part`; 1 if nothing lies beyond.
     pub(super) fn next_ring(&self, part: f64) -> f64 {
         let LoadRegion { middle, radii, .. } = self.range;
         let there = self.range.grown(0.0).bounds();
         if there.is_empty() {
             return 1.0;
         }
-        // How far the nearest and the farthest points of what there is lie from the middle, in radii.
+        // The distances of the nearest and the farthest existing points from the middle, in radii.
         let [nearest, farthest] = [false, true].map(|is_farthest| {
             let squares = (0..3).map(|axis| {
                 let ends = [there.min[axis], there.max[axis]].map(|end| f64::from(end) - middle[axis]);
@@ -253,7 +253,7 @@ impl View {
         if next < farthest { next.max(f64::MIN_POSITIVE) } else { 1.0 }
     }
 
-    /// Whether it differs from another one by a few steps of a viewer, so that few chunks differ.
+    /// Whether the view differs from another one by a few steps of a viewer, so that few chunks differ.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 2.0);
         let are_near = |a: &LoadRegion, b: &LoadRegion| {
@@ -272,7 +272,7 @@ impl View {
         self.forward != old.forward || self.range.radii != old.range.radii || (0..3).any(moved)
     }
 
-    /// Whether all that it asks for is what another one asks for.
+    /// Whether two views ask for the same chunks.
     pub(super) fn has_borders_of(&self, other: &Self) -> bool {
         other.facing(self.forward) == *self
     }
@@ -338,7 +338,7 @@ mod tests {
                 .collect();
             let grown = set(&range.grown(1.0));
             prop_assert!(neighbours.is_subset(&grown));
-            // Where the extent cuts the range, chunks beyond it may have been the neighbours.
+            // Where the extent cuts the region, chunks beyond it may have been the neighbours.
             prop_assert!(!plain.is_empty() || grown.len() <= EXTENT.points().count());
         }
 

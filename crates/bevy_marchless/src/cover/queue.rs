@@ -1,4 +1,4 @@
-//! [`ChunkQueue`]: chunks that wait for something, each once, the most urgent first.
+//! [`ChunkQueue`]: a priority queue of chunks for several viewers.
 
 use core::cmp::Reverse;
 use core::ops::Bound;
@@ -9,27 +9,27 @@ use bevy_platform::collections::HashSet;
 use super::{Cover, View, ViewId};
 use crate::chunk::ChunkKey;
 
-/// This many chunks of a viewer are sorted at once.
+/// The number of a viewer's chunks that are sorted at once.
 const SOON: usize = 256;
-/// Stale entries of a viewer are pruned once there are more than this, and twice as many as after the last time.
+/// The least number of a viewer's entries at which stale ones are pruned; then it is twice the number that was left.
 const FEW: usize = 1024;
 
-/// Chunks that wait for something, each once. Viewers take turns, and each has its chunks in order of urgency.
+/// A priority queue that holds each chunk once. Viewers take turns, and each has its chunks in order of urgency.
 ///
-/// Thousands may wait while few of them have their turn, and what is urgent changes with each viewer's steps. So only
-/// those that come soon are sorted, and only for the viewer that has moved.
+/// Thousands of chunks may wait while few have their turn, and urgency changes with each step of a viewer. So only the
+/// chunks that come soon are sorted, and only for a viewer that has moved.
 #[derive(Debug, Default)]
 pub(crate) struct ChunkQueue {
-    /// Before all others.
+    /// The chunks that come before all others.
     first: UniqueQueue,
-    /// Those of each viewer; `None` has those that no viewer asks for, too.
+    /// The queue of each viewer; that of `None` also holds the chunks that no viewer sees.
     queues: BTreeMap<ViewId, PriorityQueue>,
     members: HashSet<ChunkKey>,
-    /// Whose turn it was last.
+    /// The viewer that had the last turn.
     last: ViewId,
 }
 
-/// Chunks, each once, in the order in which they came.
+/// A queue that holds each chunk once, first in, first out.
 #[derive(Debug, Default)]
 pub(crate) struct UniqueQueue {
     keys: VecDeque<ChunkKey>,
@@ -63,17 +63,17 @@ impl ChunkQueue {
         self.members.is_empty() && self.first.is_empty()
     }
 
-    /// How many chunks wait; one that has been put first may count twice.
+    /// The number of chunks in the queue; a chunk that was moved to the front may count twice.
     pub(crate) fn len(&self) -> usize {
         self.members.len() + self.first.len()
     }
 
-    /// How many chunks wait for a viewer.
+    /// The number of chunks in a viewer's queue.
     pub(crate) fn len_of(&self, id: ViewId) -> usize {
         self.queues.get(&id).map_or(0, |queue| queue.soon.len() + queue.later.len())
     }
 
-    /// All chunks, in no order; one that has been put first may come twice.
+    /// All chunks, in no order; a chunk that was moved to the front may come twice.
     pub(crate) fn iter(&self) -> impl Iterator<Item = ChunkKey> + '_ {
         self.first.keys.iter().chain(&self.members).copied()
     }
@@ -82,7 +82,7 @@ impl ChunkQueue {
         *self = Self::default();
     }
 
-    /// Adds a chunk, which comes when it is its turn for the viewer to which it matters most.
+    /// Adds a chunk to the queue of the viewer for which it is most urgent.
     pub(crate) fn add(&mut self, key: ChunkKey, cover: &Cover) {
         if self.members.insert(key) {
             let (id, urgency) = cover.most_urgent(key.position).unwrap_or_default();
@@ -90,26 +90,26 @@ impl ChunkQueue {
         }
     }
 
-    /// Adds a chunk, which comes before all others.
+    /// Adds a chunk in front of all others.
     pub(crate) fn add_first(&mut self, key: ChunkKey) {
         self.first.push(key);
     }
 
-    /// Adds one of many chunks that a viewer asks for, to be sorted later.
+    /// Adds one of many chunks of a viewer, to be sorted later.
     pub(crate) fn add_unsorted(&mut self, key: ChunkKey, id: ViewId) {
         if self.members.insert(key) {
             self.queues.entry(id).or_default().later.push(key);
         }
     }
 
-    /// Notes that it has become another question what is urgent for a viewer.
+    /// Notes that the urgencies of a viewer's chunks have changed.
     pub(crate) fn sort_again(&mut self, id: ViewId) {
         if let Some(queue) = self.queues.get_mut(&id) {
             queue.sort_again();
         }
     }
 
-    /// Hands the chunks of a viewer that is gone to others.
+    /// Hands the chunks of a removed viewer to others.
     pub(crate) fn remove_view(&mut self, id: ViewId, cover: &Cover) {
         let Some(PriorityQueue { soon, later, .. }) = self.queues.remove(&id) else { return };
         for key in soon.into_iter().map(|(_, Reverse(key))| key).chain(later) {
@@ -143,16 +143,16 @@ impl ChunkQueue {
     }
 }
 
-/// The chunks of one viewer.
+/// The priority queue of one viewer.
 #[derive(Debug)]
 struct PriorityQueue {
-    /// The most urgent ones, the first at the end.
+    /// The most urgent chunks, the first one at the end.
     soon: Vec<(Reverse<u32>, Reverse<ChunkKey>)>,
     is_sorted: bool,
     later: Vec<ChunkKey>,
-    /// None that comes later is more urgent. The lower, the sooner.
+    /// The threshold of urgency: no chunk in `later` has a lower one.
     bar: u32,
-    /// When this many come later, stale ones are pruned.
+    /// The length of `later` at which stale entries are pruned.
     prune_at: usize,
 }
 
@@ -202,7 +202,7 @@ impl PriorityQueue {
         }
     }
 
-    /// Chooses who comes soon from all that come later.
+    /// Moves the most urgent chunks of `later` to `soon`.
     fn choose(&mut self, view: Option<&View>, members: &mut HashSet<ChunkKey>, waits: impl Fn(&ChunkKey) -> bool) {
         if self.later.len() >= self.prune_at {
             self.later.retain(|key| {
@@ -278,7 +278,7 @@ mod tests {
             if waits(&ChunkKey::finest(first)) {
                 prop_assert_eq!(queue.pop(&cover, waits), Some(ChunkKey::finest(first)));
             }
-            // What is added in between finds its place.
+            // Chunks added in between find their place.
             if let Some(key) = queue.pop(&cover, waits) {
                 queue.add(key, &cover);
             }

@@ -1,17 +1,17 @@
-//! [`Borders`]: all chunks that a view asks for, row by row, and how those of two views differ.
+//! [`Borders`]: all chunks that a view asks for, row by row, and the differences between two views.
 
 use core::ops;
 
 use super::{Residency, View};
 
-/// Chunks in rows along x.
+/// A set of chunks, as rows along x.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
-    /// The first y and z.
+    /// The y and z of the first row.
     from: [i32; 2],
-    /// How many rows follow each other along y.
+    /// The number of rows along y.
     count: usize,
-    /// Where each row starts and ends; y fastest. Some rows are empty.
+    /// The start and the end of each row; y fastest. Some rows are empty.
     spans: Vec<[i32; 2]>,
 }
 
@@ -21,38 +21,38 @@ impl Rows {
         Self { from, count, spans }
     }
 
-    /// All rows: y, z, and which x.
+    /// All rows: y, z, and the range of x.
     pub(super) fn iter(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
         let [first_y, first_z] = self.from;
-        // Counted from 0: the last row may be the last that there is a number for.
+        // Counted from 0: the last row may have the largest number that there is.
         (0..).zip(self.spans.chunks(self.count.max(1))).flat_map(move |(z, spans)| {
             (0..).zip(spans).map(move |(y, &[start, end])| (first_y + y, first_z + z, start..end))
         })
     }
 
-    /// How many chunks they hold.
+    /// The number of chunks.
     fn len(&self) -> usize {
         self.spans.iter().map(|[start, end]| (end - start).max(0) as usize).sum()
     }
 
-    /// The rows of a z, from their first y on.
+    /// The rows of one z, from the first y on.
     fn layer(&self, z: i32) -> &[[i32; 2]] {
         let index = z.checked_sub(self.from[1]).and_then(|index| usize::try_from(index).ok());
         let start = index.and_then(|index| index.checked_mul(self.count));
         start.and_then(|start| self.spans.get(start..start + self.count)).unwrap_or_default()
     }
 
-    /// Takes the chunks that others do not have. `around`: rows whose own difference has what lies beyond them.
+    /// Calls `take` with the chunks that `others` lack. `around`: rows whose own difference reports the chunks beyond them.
     fn difference(&self, others: &Self, around: Option<&Self>, take: &mut impl FnMut([i32; 3])) {
         let row_of = |rows: &Self, layer: &[[i32; 2]], y: i32| {
-            // Before the first row, that is a number that no layer has.
+            // Before the first row, the index wraps to a number that no layer has.
             let index = y.wrapping_sub(rows.from[0]).cast_unsigned() as usize;
             layer.get(index).copied().unwrap_or([0, 0])
         };
         for (z, spans) in (0..).zip(self.spans.chunks(self.count.max(1))) {
             let z = self.from[1] + z;
             let other_layer = others.layer(z);
-            // Most layers of two views a step apart are alike.
+            // Most layers of two views a step apart are equal.
             if self.from[0] == others.from[0] && spans == other_layer {
                 continue;
             }
@@ -79,13 +79,13 @@ impl Rows {
 /// All chunks that a view asks for.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Borders {
-    /// Those that are drawn, and those around them, too.
+    /// The drawn chunks, and the chunks around them.
     drawn: Rows,
     around: Rows,
-    /// Those that stay drawn, and those around them, too.
+    /// The chunks that stay drawn, and the chunks around them.
     stays: Rows,
     stays_around: Rows,
-    /// Those whose samples are wanted, and those whose samples stay; `None`: the ones around those that are drawn.
+    /// The chunks whose samples are wanted, and those whose samples stay; `None`: the ones around drawn chunks.
     samples: Option<[Rows; 2]>,
 }
 
@@ -102,7 +102,7 @@ impl Borders {
         }
     }
 
-    /// The chunks of which more may be wanted than with `old` borders, and how much.
+    /// Reports the chunks that may be wanted more than with the `old` borders, and how much.
     pub(super) fn come(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
         self.drawn.difference(&old.drawn, None, &mut |position| take(position, Residency::Mesh));
         let mut take = |position| take(position, Residency::Samples);
@@ -112,12 +112,12 @@ impl Borders {
         }
     }
 
-    /// How many of the chunks, those around the drawn ones included, others do not have that lie within these.
+    /// The number of chunks within these borders, the ones around drawn chunks included, that `others` lack.
     pub(super) fn len_beyond(&self, others: &Self) -> usize {
         self.around.len().saturating_sub(others.around.len())
     }
 
-    /// The chunks of which less may be wanted than with `old` borders, and how much at most.
+    /// Reports the chunks that may be wanted less than with the `old` borders, and how much at most.
     pub(super) fn go(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
         let stays_around = Some(&self.stays_around);
         old.stays.difference(&self.stays, stays_around, &mut |position| take(position, Residency::Samples));
