@@ -1,9 +1,9 @@
-//! [`Heart`]: what a terrain is made of, what is shown of it, and what is to be done about it. It knows no system, no query
-//! and no command: systems tell it what has happened, and carry out what it asks for.
+//! [`Heart`]: the state of one terrain and its transitions. It knows no system, no query and no command: systems report
+//! events to it, and carry out what it returns.
 //!
-//! Its parts own their state, and each is tested alone: [`SampleStore`] (what is there), [`ChunkTable`] (how far each
-//! loaded chunk is), [`Groups`] (what is meshed together), [`Cover`] (what is wanted). What takes several of them is here,
-//! an event a function: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples arrive),
+//! Its parts own their state, and each is tested alone: [`SampleStore`] (the samples), [`ChunkTable`] (the state of each
+//! loaded chunk), [`Groups`] (chunks meshed together), [`Cover`] (wanted chunks). Events that involve several parts are
+//! functions here, by topic: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples arrive),
 //! [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle) (colours, normals
 //! and isovalue change).
 
@@ -47,11 +47,11 @@ use restyle::{Appearance, Transition};
 /// The linear colours of all materials.
 pub(crate) type Colors = Arc<[[f32; 4]; 256]>;
 
-/// What a terrain's samples are before anyone edits them.
+/// The settings that a terrain's samples depend on before any edit.
 #[derive(Clone)]
 pub(crate) struct SamplingSettings {
     pub(crate) source: Arc<dyn Source>,
-    /// The chunks that there are.
+    /// The chunks that exist.
     pub(crate) extent: Region,
     /// Cells of a chunk per axis.
     pub(crate) cells: u32,
@@ -67,40 +67,40 @@ pub(crate) struct Heart {
     table: ChunkTable,
     groups: Groups,
     cover: Cover,
-    /// Whether some viewer has moved since chunks last followed.
+    /// Whether a viewer has moved since chunks last followed.
     has_moved: bool,
-    /// Chunks of which more may be wanted, and of which less.
+    /// Chunks that may be wanted more than now, and chunks that may be wanted less.
     arriving: ChunkQueue,
     leaving: UniqueQueue,
     /// Chunks that wait to be sampled.
     to_fill: ChunkQueue,
     /// Chunks with a surface that wait to be meshed for the first time.
     to_mesh: ChunkQueue,
-    /// Chunks whose samples may be dropped, once nothing else is to be done.
+    /// Chunks whose samples may be dropped when nothing else is to be done.
     droppable: UniqueQueue,
-    /// Chunks that are not loaded, whose samples are wanted because of their many stamps.
+    /// Unloaded chunks whose samples are wanted because they have many stamps.
     crowded: UniqueQueue,
-    /// Those of them that are being sampled, each with its job.
+    /// The crowded chunks that are being sampled, each with its job.
     remote: HashMap<[i32; 3], (u64, Ticket)>,
-    /// How many jobs are sampling, or about to.
+    /// The number of sampling jobs that run or are about to.
     sampling: usize,
-    /// What the source is certain of, box by box.
+    /// The source's bounds, by boxes of chunks.
     bounds: HashMap<[i32; 3], Option<GridChunk<i16>>>,
     /// The isovalue as drawn.
     isovalue: f32,
     appearance: Appearance,
-    /// Chunks that may have to get another look.
+    /// Chunks whose appearance may be out of date.
     to_restyle: UniqueQueue,
-    /// The change of the isovalue that is under way, and the one to come after it.
+    /// The running change of the isovalue, and the isovalue that comes after it.
     transition: Option<Transition>,
     next_isovalue: Option<f32>,
     /// Whether a stamp waits for samples that had been dropped.
     holds_stamps: bool,
-    /// Whether something of the present source has been shown.
+    /// Whether any chunk of the present source has been shown.
     has_shown: bool,
-    /// What late stamps have changed in this update.
+    /// The edits that late stamps have made in this update.
     late_edits: Vec<Edit>,
-    /// What jobs have made, and what of it waits for an update with more time.
+    /// Results of jobs, and those that wait for an update with more time.
     filled: Results<Filled>,
     filled_later: VecDeque<Filled>,
     meshed: Results<MeshResult>,
@@ -142,7 +142,7 @@ impl Default for Heart {
 }
 
 impl Heart {
-    /// A terrain of which nothing is loaded yet. `meshing`: whether somebody makes meshes.
+    /// A terrain without any loaded chunk. `meshing`: whether chunks are meshed at all.
     pub(crate) fn new(recipe: SamplingSettings, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
         Self {
             samples: SampleStore::of(recipe.empty_grid()),
@@ -154,8 +154,8 @@ impl Heart {
         }
     }
 
-    /// Has all samples come from another source: what was edited is gone, and what is drawn stays until each chunk's new
-    /// mesh is there. The chunks are where they were.
+    /// Replaces all samples by those of another source. Edits are lost; a drawn chunk stays until its new mesh is there. The
+    /// chunks stay where they are.
     pub(crate) fn refill(&mut self, recipe: SamplingSettings, isovalue: f32) {
         self.samples.refill(recipe.empty_grid());
         self.table.refill();
@@ -174,17 +174,17 @@ impl Heart {
         table.keys().for_each(|key| arriving.add(key, cover));
     }
 
-    /// The chunks that there are; `None` before the terrain's settings have been accepted.
+    /// The chunks that exist; `None` before the terrain's settings have been accepted.
     pub(crate) fn extent(&self) -> Option<Region> {
         self.recipe.as_ref().map(|recipe| recipe.extent)
     }
 
-    /// Whether all chunks that were there when the present source began have been shown with it, and some chunk if there is
-    /// any to show, so that the next may begin.
+    /// Whether the next source may begin: every chunk that existed when the present source began has been shown with it, and
+    /// at least one chunk if there is any to show.
     pub(crate) fn is_generation_shown(&self) -> bool {
         let counts = self.table.counts();
         let may_show = self.table.makes_meshes() && counts.waiting + counts.empty + counts.drawn > 0;
-        // Chunks whose entities the game has despawned count as empty, and are shown no more.
+        // Chunks whose entities the game has despawned count as empty, and are not shown again.
         counts.outdated == 0 && (self.has_shown || !may_show || self.is_settled())
     }
 
@@ -196,7 +196,7 @@ impl Heart {
         &self.table
     }
 
-    /// Takes the entities that nothing is shown on any more.
+    /// Takes the entities to be despawned.
     pub(crate) fn take_released(&mut self) -> Vec<Entity> {
         self.table.take_released()
     }
@@ -206,22 +206,22 @@ impl Heart {
         self.isovalue
     }
 
-    /// Where the jobs that sample leave what they made.
+    /// The queue of results from sampling jobs.
     pub(crate) const fn filled(&self) -> &Results<Filled> {
         &self.filled
     }
 
-    /// Where the jobs that mesh leave what they made.
+    /// The queue of results from meshing jobs.
     pub(crate) const fn meshed(&self) -> &Results<MeshResult> {
         &self.meshed
     }
 
-    /// How the meshes that are started now are made.
+    /// The settings of meshes that start now.
     pub(crate) fn mesh_settings(&self) -> MeshSettings {
         MeshSettings { isovalue: self.isovalue, normals: self.appearance.normals, ..MeshSettings::default() }
     }
 
-    /// The colours of the meshes that are started now.
+    /// The colours of meshes that start now.
     pub(crate) const fn colors(&self) -> &Colors {
         &self.appearance.colors
     }
@@ -231,14 +231,14 @@ impl Heart {
         self.holds_stamps = holds;
     }
 
-    /// What is shown of the chunk at a place; `None` where it is in no range.
+    /// The leaf at a position; `None` if it is in no view.
     pub(crate) fn leaf_at(&self, position: [i32; 3]) -> Option<Leaf> {
         let is_coming = || self.cover.contains(position).then_some(LeafState::Waiting);
         let state = self.table.leaf_state(ChunkKey::finest(position)).or_else(is_coming)?;
         Some(Leaf { level: 0, position: position.into(), state })
     }
 
-    /// How many leaves of each state there are.
+    /// The numbers of leaves in each state.
     pub(crate) fn coverage(&self) -> Coverage {
         let counts = self.table.counts();
         let is_coming = |key: &ChunkKey| !self.table.is_leaf(*key) && self.cover.contains(key.position);
@@ -258,35 +258,35 @@ impl Heart {
             && !self.holds_stamps
     }
 
-    /// Whether all chunks in range have their samples and everything is drawn as it is.
+    /// Whether all chunks in range have their samples and show their newest state.
     pub(crate) fn is_settled(&self) -> bool {
         let nothing_waits = !self.table.makes_meshes() || self.table.counts().waiting == 0;
         self.is_idle() && nothing_waits && self.to_restyle.is_empty() && self.transition.is_none()
     }
 
-    /// Whether nothing is left to load, to fill or to mesh.
+    /// Whether nothing is left to load, fill or mesh.
     fn is_idle(&self) -> bool {
         let nothing_to_mesh = self.table.ready_len() == 0 && self.to_mesh.is_empty() && self.groups.is_empty();
         self.is_filled() && nothing_to_mesh
     }
 
-    /// How many chunks wait for their samples.
+    /// The number of chunks that wait for their samples.
     pub(crate) fn waiting_for_samples(&self) -> usize {
         self.table.counts().unfilled
     }
 
-    /// How many chunks can be meshed, or are being meshed.
+    /// The number of chunks that can be meshed or are being meshed.
     pub(crate) fn waiting_for_meshes(&self) -> usize {
         let in_transition = self.transition.as_ref().map_or(0, Transition::waiting);
         self.table.ready_len() + self.to_mesh.len() + self.groups.len() + self.to_restyle.len() + in_transition
     }
 
-    /// How many chunks in range, or beside it, nobody has looked at yet.
+    /// The number of chunks in or beside the views that have not been visited yet.
     pub(crate) fn waiting_to_come(&self) -> usize {
         self.arriving.len() + self.cover.hidden()
     }
 
-    /// Changes what a viewer sees; `None`: it is gone.
+    /// Changes a viewer's view; `None` removes it.
     pub(crate) fn set_view(&mut self, id: ViewId, view: Option<crate::cover::View>) {
         let Self { cover, table, arriving, leaving, to_fill, to_mesh, has_moved, .. } = self;
         let old = cover.view(id).copied();
@@ -322,12 +322,12 @@ impl Heart {
 }
 
 impl SamplingSettings {
-    /// A grid for its chunks; the settings have been checked.
+    /// An empty grid for the chunks; the settings have been checked.
     pub(crate) fn empty_grid(&self) -> Grid<i16> {
         Grid::bounded(self.cells, self.extent).expect("the settings have been checked")
     }
 
-    /// Whether the samples of a chunk are those of another one, where both have it.
+    /// Whether two chunks share their samples, where both exist.
     pub(crate) fn has_samples_of(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.source, &other.source) && (self.cells, self.spacing) == (other.cells, other.spacing)
     }

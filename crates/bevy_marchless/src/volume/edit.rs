@@ -1,4 +1,4 @@
-//! Stamps change samples, and what they change together becomes one set of chunks to be meshed.
+//! Stamps change samples; the chunks that they change together become one set to be meshed.
 
 use core::mem;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,18 +11,18 @@ use super::groups::Pending;
 use crate::chunk::ChunkKey;
 use crate::stats::RequestTime;
 
-/// What the stamps of one update have changed of a terrain. Those whose chunks overlap belong together; others stay apart,
-/// so that each is shown and reported by itself.
+/// The changes that one update's stamps make to a terrain. Stamps whose chunks overlap form one region; each region is
+/// shown and reported by itself.
 #[derive(Default)]
 pub(crate) struct Edits {
     regions: Vec<Option<EditedRegion>>,
-    /// Which region a chunk with changed samples, or beside such a chunk, belongs to.
+    /// The region of each chunk that has changed samples, or lies beside one that has.
     owners: HashMap<[i32; 3], usize>,
-    /// The chunks with changed samples, as they were.
+    /// The chunks with changed samples, as they were before.
     before: BTreeMap<[i32; 3], GridChunk<i16>>,
 }
 
-/// What some stamps have changed together.
+/// The changes that some stamps made together.
 struct EditedRegion {
     edit: Edit,
     /// Chunks with changed samples.
@@ -33,13 +33,13 @@ struct EditedRegion {
 }
 
 impl Edits {
-    /// Adds what one stamp has changed.
+    /// Adds the changes of one stamp.
     fn add(&mut self, mut new: EditedRegion) {
         let mut overlapping: Vec<usize> =
             new.affected.iter().filter_map(|chunk| self.owners.get(chunk)).copied().collect();
         overlapping.sort_unstable();
         overlapping.dedup();
-        // The largest takes the others in; what the stamp itself changed comes last.
+        // The largest region takes the others in; the stamp's own chunks come last.
         let size = |index: &usize| self.regions[*index].as_ref().map_or(0, |region| region.affected.len());
         let home = overlapping.iter().copied().max_by_key(size);
         let mut all = home.and_then(|home| self.regions[home].take());
@@ -87,8 +87,7 @@ impl Heart {
         }
     }
 
-    /// Notes which chunks an update's stamps have changed, and which of them are to be meshed. Returns what each region's
-    /// stamps have changed.
+    /// Records the changes of an update's stamps, and queues the chunks to be meshed. Returns the edit of each region.
     pub(crate) fn finish_edits(&mut self, edits: Edits) -> Vec<Edit> {
         let Edits { regions, before, .. } = edits;
         let settings = self.mesh_settings();
@@ -114,7 +113,7 @@ impl Heart {
         !self.late_edits.is_empty()
     }
 
-    /// What stamps have changed in this update of chunks that have just got their samples. What touches is one.
+    /// The edits made in this update to chunks that have just got their samples. Edits that touch are merged.
     pub(crate) fn take_late_edits(&mut self) -> Vec<Edit> {
         let mut merged: Vec<Edit> = Vec::new();
         for edit in mem::take(&mut self.late_edits) {
@@ -127,14 +126,14 @@ impl Heart {
         merged
     }
 
-    /// Whether all samples are there that a change of these lattice points needs, or may come as they are filled. Those
-    /// that have been dropped are asked for.
+    /// Whether all samples are resident that a change of these lattice points needs, or are being filled. Dropped samples are
+    /// requested again.
     pub(crate) fn has_samples_for(&mut self, changed: Region) -> bool {
         if !self.cover.drops_samples() || changed.is_empty() {
             return true;
         }
         let affected = self.samples.newest().chunks_affected_by(changed).grown(1, 1);
-        // What is being filled again still has its neighbours on the screen.
+        // A chunk that is being filled again still has its neighbours on the screen.
         let is_lost = |key: &ChunkKey| self.table.is_shown(*key) && !self.table.is_filled(*key);
         let all = affected.size().into_iter().map(u64::from).product::<u64>();
         let lost: Vec<ChunkKey> = if all < self.table.len() as u64 {
@@ -146,7 +145,7 @@ impl Heart {
         lost.is_empty()
     }
 
-    /// Chunks have changed together.
+    /// Records that chunks have changed together.
     pub(super) fn changed(&mut self, pending: Pending) {
         if !self.table.makes_meshes() {
             return;

@@ -1,4 +1,4 @@
-//! Samples are asked for, and arrive.
+//! Samples are requested, and arrive.
 
 use core::time::Duration;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,10 +14,10 @@ use crate::chunk::ChunkKey;
 use crate::jobs::{Ticket, new_number};
 use crate::stats::TerrainStats;
 
-/// Bounds of this many boxes are remembered.
+/// The number of boxes whose bounds are cached.
 const MOST_BOXES: usize = 4096;
 
-/// Sampling one chunk.
+/// A job that samples one chunk.
 pub(crate) struct FillJob {
     job: u64,
     generation: u64,
@@ -27,11 +27,11 @@ pub(crate) struct FillJob {
     spacing: f64,
     isovalue: f32,
     replay: Replay,
-    /// The lower, the sooner.
+    /// The urgency: lower comes sooner.
     pub(crate) urgency: u32,
 }
 
-/// A chunk that has been sampled.
+/// The result of a sampling job.
 pub(crate) struct Filled {
     job: u64,
     generation: u64,
@@ -39,7 +39,7 @@ pub(crate) struct Filled {
     chunk: GridChunk<i16>,
     signs: KnownSigns,
     replayed: Replayed,
-    /// Whether the source filled it, instead of being certain of it.
+    /// Whether the source was sampled, rather than its bound used.
     pub(crate) filled: bool,
     /// Whether the source panicked.
     pub(crate) panicked: bool,
@@ -47,14 +47,14 @@ pub(crate) struct Filled {
 }
 
 impl Filled {
-    /// Whether some samples lie inside and some outside, for all that is known.
+    /// Whether the chunk may have samples on both sides of the surface.
     pub(crate) const fn may_have_surface(&self) -> bool {
         self.signs.may_have_surface()
     }
 }
 
 impl FillJob {
-    /// Samples the chunk, on any thread. A source that panics gives air.
+    /// Samples the chunk, on any thread. If the source panics, the chunk is air.
     pub(crate) fn run(self) -> Filled {
         let start = Instant::now();
         let Self { job, generation, position, source, cells, spacing, isovalue, replay, .. } = self;
@@ -80,8 +80,7 @@ impl Heart {
         !self.to_fill.is_empty() || !self.crowded.is_empty()
     }
 
-    /// Asks for the samples of the chunks that wait for them, the most urgent first, until this many jobs are under way.
-    /// `start`: starts a job.
+    /// Requests the samples of waiting chunks, the most urgent first, until `most` jobs are under way. `start` starts a job.
     pub(crate) fn ask_for_samples(&mut self, limit: usize, mut start: impl FnMut(FillJob) -> Ticket) {
         let Some(recipe) = self.recipe.clone() else { return };
         while self.sampling < limit {
@@ -105,7 +104,7 @@ impl Heart {
         }
     }
 
-    /// Takes what jobs have sampled, as long as there is time. `least`: this many in any case. Returns those that were taken.
+    /// Takes results of sampling jobs while there is time, and at least `least` of them. Returns those that were taken.
     pub(crate) fn take_filled(&mut self, least: usize, until: Instant, mut note: impl FnMut(&Filled)) {
         self.filled_later.extend(self.filled.take());
         let mut taken = 0;
@@ -120,12 +119,12 @@ impl Heart {
         }
     }
 
-    /// Whether sampled chunks wait to be taken.
+    /// Whether results of sampling jobs wait to be taken.
     pub(crate) fn has_filled(&self) -> bool {
         !self.filled_later.is_empty() || !self.filled.is_empty()
     }
 
-    /// A job has sampled a chunk.
+    /// Takes the result of a job.
     fn samples_arrived(&mut self, filled: Filled) {
         let Filled { job, position, chunk, signs, replayed, .. } = filled;
         let key = ChunkKey::finest(position);
@@ -143,7 +142,7 @@ impl Heart {
         }
     }
 
-    /// Fills a loaded chunk at once where that needs no job.
+    /// Fills a loaded chunk at once if that needs no job.
     pub(super) fn fill(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         if self.samples.is_resident(key.position) {
             self.table.samples_arrived(key, None);
@@ -160,9 +159,9 @@ impl Heart {
         }
     }
 
-    /// Takes in the samples of a loaded chunk, and the stamps that came before them.
+    /// Takes in the samples of a loaded chunk, with the stamps that came before them.
     fn take_in(&mut self, key: ChunkKey, chunk: GridChunk<i16>, signs: KnownSigns, replayed: Option<Replayed>) {
-        // Whoever was to sample it for its stamps alone comes too late.
+        // A job that was to sample the chunk for its stamps alone comes too late.
         if self.remote.remove(&key.position).is_some() {
             self.sampling -= 1;
         }
@@ -175,7 +174,7 @@ impl Heart {
         let signs = if at_border || !affected.is_empty() { KnownSigns::UNKNOWN } else { signs };
         self.table.samples_arrived(key, Some(signs));
         self.filled_around(key);
-        // What has not been drawn is meshed once all around it is filled.
+        // A chunk that was never drawn is meshed when all chunks around it are filled.
         let chunks = affected.into_iter().map(ChunkKey::finest);
         self.changed(Pending {
             chunks: chunks.filter(|key| self.table.is_shown(*key)).collect(),
@@ -183,7 +182,7 @@ impl Heart {
         });
     }
 
-    /// A chunk has got its samples: who waited for them may go on.
+    /// Wakes everything that waited for the samples of a chunk.
     fn filled_around(&mut self, key: ChunkKey) {
         self.groups.wake();
         self.unblock_transition(key);
@@ -206,7 +205,7 @@ impl Heart {
         }
     }
 
-    /// What the source is certain of without sampling.
+    /// The bound of a chunk by its source, without sampling.
     fn bound(&mut self, position: [i32; 3]) -> Option<GridChunk<i16>> {
         let SamplingSettings { source, cells, spacing, .. } = self.recipe.as_ref()?;
         if self.bounds.len() > MOST_BOXES {
@@ -218,14 +217,14 @@ impl Heart {
     }
 }
 
-/// What a source is certain of for the box of chunks around one. A source that panics is certain of nothing.
+/// The source's bound of the box of chunks around one. A source that panics is certain of nothing.
 fn bound_box(source: &dyn Source, position: [i32; 3], cells: u32, spacing: f64) -> Option<GridChunk<i16>> {
     let lowest = GridChunk::<i16>::bound_box(position).map(|v| v * BOUND_BOX_CHUNKS);
     let of_box = || GridChunk::box_without_sampling(source, lowest, BOUND_BOX_CHUNKS as u32, cells, spacing);
     catch_unwind(AssertUnwindSafe(of_box)).ok().flatten()
 }
 
-/// What a source is certain of for a chunk, given what it is for the box around it.
+/// The source's bound of a chunk, given the bound of the box around it.
 fn bound_chunk(
     source: &dyn Source,
     of_box: Option<GridChunk<i16>>,

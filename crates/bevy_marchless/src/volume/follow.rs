@@ -1,4 +1,4 @@
-//! Chunks come and go: each becomes what the cover asks of it.
+//! Chunks come and go: each gets the residency that the cover asks for.
 
 use bevy_platform::time::Instant;
 use marchless::{GridChunk, Region};
@@ -11,9 +11,9 @@ use crate::chunk::ChunkKey;
 use crate::cover::{Residency, ViewId};
 use crate::stats::TerrainStats;
 
-/// Each update at least this many chunks come, and as many go.
+/// The number of chunks that come, and that go, in each update at least.
 const MIN_CHUNKS: usize = 4;
-/// A view is revealed further while fewer of its chunks wait.
+/// A view is revealed further while fewer of its chunks than this wait.
 const FEW: usize = 256;
 
 impl Heart {
@@ -23,13 +23,13 @@ impl Heart {
         !is_idle || !self.droppable.is_empty() || self.has_lost_leaves()
     }
 
-    /// Lets chunks go and come until it is late, those that are wanted most first.
+    /// Lets chunks go and come until the time is over, the most wanted first.
     pub(crate) fn follow(&mut self, until: Instant, stats: &mut TerrainStats) {
         if self.recipe.is_none() {
             return;
         }
         self.reveal(until);
-        // Both have half of the time, unless as many are on their way out as viewers see: then hardly any come.
+        // Each gets half of the time. But if as many chunks are leaving as viewers see, hardly any come.
         let is_crowded = self.leaving.len() as f64 > self.cover.size();
         let share = if self.arriving.is_empty() || is_crowded { 1 } else { 2 };
         let now = Instant::now();
@@ -49,7 +49,7 @@ impl Heart {
             self.follow_residency(key, stats);
             done += 1;
         }
-        // That goes through all chunks: not while viewers move.
+        // This goes through all chunks, so it is not done while viewers move.
         if !core::mem::take(&mut self.has_moved) && self.has_lost_leaves() {
             self.give_up_lost_leaves();
         }
@@ -64,21 +64,20 @@ impl Heart {
         }
     }
 
-    /// Whether leaves wait though nothing is left to be done: they went out of range before they were drawn, and of what is not
-    /// drawn the margin keeps nothing.
+    /// Whether leaves wait though there is nothing left to do. They went out of range before they were drawn, and the margin
+    /// keeps only drawn chunks.
     fn has_lost_leaves(&self) -> bool {
         self.table.makes_meshes() && self.table.counts().waiting > 0 && self.is_idle()
     }
 
-    /// Goes through all chunks, once after viewers have come to rest.
+    /// Visits all chunks, once after viewers have come to rest.
     fn give_up_lost_leaves(&mut self) {
         let waits = |key: &ChunkKey| self.table.is_leaf(*key) && !self.table.is_shown(*key);
         let lost: Vec<ChunkKey> = self.table.keys().filter(waits).collect();
         lost.into_iter().for_each(|key| self.leaving.push(key));
     }
 
-    /// Reveals more of the views that are new, where few of their chunks wait; of one of them at least. Returns whether there
-    /// was one.
+    /// Reveals more of the new views that have few waiting chunks, and of at least one of them. Returns whether there was one.
     fn reveal(&mut self, until: Instant) -> bool {
         let Self { cover, table, arriving, .. } = self;
         let keeps_samples = !cover.drops_samples();
@@ -97,8 +96,8 @@ impl Heart {
         !few.is_empty()
     }
 
-    /// Gives the terrain another extent. Chunks that it has before and after stay, with all that was dug; those beyond go, but
-    /// for their edits. Walls come and go chunk by chunk, as soon as what is around them is there.
+    /// Changes the terrain's extent. Chunks inside both extents stay, with all edits; of those beyond, only the edits stay.
+    /// Walls appear and disappear chunk by chunk, as soon as the chunks around them are there.
     pub(crate) fn resize(&mut self, extent: Region) {
         let Some(recipe) = &mut self.recipe else { return };
         let former = core::mem::replace(&mut recipe.extent, extent);
@@ -122,7 +121,7 @@ impl Heart {
     fn at_other_border(&mut self, key: ChunkKey) {
         self.table.samples_changed(key);
         if self.groups.is_claimed(key) {
-            // It is being meshed as it was.
+            // The chunk is being meshed with the former border.
             self.changed(Pending { chunks: [key].into(), ..Pending::default() });
         } else {
             self.table.set_stale(key);
@@ -131,18 +130,18 @@ impl Heart {
         if self.table.lacks_samples(key) {
             self.look_at(key);
         } else {
-            // It may have waited for samples that are not wanted any more.
+            // The chunk may have waited for samples that are not wanted any more.
             self.groups.wake();
             self.unblock_transition(key);
         }
     }
 
-    /// The game has despawned a chunk's entity. Its samples stay: its neighbours' meshes need them.
+    /// Takes in that the game has despawned a chunk's entity. The samples stay: the meshes of its neighbours need them.
     pub(crate) fn despawned(&mut self, key: ChunkKey, entity: bevy_ecs::entity::Entity) {
         self.table.despawned(key, entity);
     }
 
-    /// The next chunk of which more may be wanted.
+    /// The next chunk that may be wanted more than now.
     fn next_arriving(&mut self, until: Instant) -> Option<ChunkKey> {
         loop {
             let Self { arriving, cover, table, .. } = self;
@@ -156,7 +155,7 @@ impl Heart {
         }
     }
 
-    /// Makes of a chunk what the cover asks of it.
+    /// Gives a chunk the residency that the cover asks for.
     fn follow_residency(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         let Some(extent) = self.recipe.as_ref().map(|recipe| recipe.extent) else { return };
         let is_there = extent.contains(key.position);
@@ -182,10 +181,10 @@ impl Heart {
         stats.loaded += 1;
     }
 
-    /// Loads neighbours of a leaf that stays for the margin's sake alone, where they went before the viewer came back: nobody
-    /// else would, and edits of the chunk would wait for them for ever.
+    /// Loads missing neighbours of a leaf that only the margin keeps: they went before the viewer came back. Nothing else would
+    /// load them, and edits of the chunk would wait for them for ever.
     fn load_lost_neighbours(&mut self, key: ChunkKey, extent: Region, stats: &mut TerrainStats) {
-        // What a chunk in range lacks comes anyway, once it has been told.
+        // The missing neighbours of a chunk in range come anyway, once they have been reported.
         let comes = self.cover.is_revealed() && self.cover.contains(key.position);
         if comes || !self.table.lacks_samples(key) {
             return;
@@ -199,7 +198,7 @@ impl Heart {
         }
     }
 
-    /// Forgets a chunk, but for its edits.
+    /// Unloads a chunk; only its edits stay.
     fn unload(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         self.hide(key);
         match self.table.unload(key) {
@@ -211,7 +210,7 @@ impl Heart {
         stats.unloaded += 1;
     }
 
-    /// Takes a chunk from the screen.
+    /// Stops drawing a chunk.
     fn hide(&mut self, key: ChunkKey) {
         if self.table.is_leaf(key) {
             self.groups.withdraw_from(key);
@@ -221,7 +220,7 @@ impl Heart {
         }
     }
 
-    /// Wants the dropped samples of a chunk again, or notes that they may be dropped.
+    /// Requests the dropped samples of a chunk again, or notes that its samples may be dropped.
     fn revive_or_drop(&mut self, key: ChunkKey) {
         if self.table.waits_for_samples(key) || self.transition_lacks(key) {
             self.revive_around(key);
@@ -234,7 +233,7 @@ impl Heart {
         }
     }
 
-    /// Drops the samples of a chunk if nobody needs them for now.
+    /// Drops the samples of a chunk if nothing needs them at present.
     fn drop_samples(&mut self, key: ChunkKey) {
         if self.may_drop(key) && self.cover.may_drop_samples(key.position) {
             self.samples.unload(key.position);
@@ -243,7 +242,7 @@ impl Heart {
         }
     }
 
-    /// Whether samples could be had again, and nothing reads them for now.
+    /// Whether samples can be made again, and nothing reads them at present.
     fn may_drop(&self, key: ChunkKey) -> bool {
         let Some(recipe) = &self.recipe else { return false };
         let is_done = |near: ChunkKey| {
@@ -262,19 +261,19 @@ impl Heart {
         }
     }
 
-    /// Asks for the dropped samples of a chunk.
+    /// Requests the dropped samples of a chunk.
     pub(super) fn revive(&mut self, key: ChunkKey) {
         if self.table.revive(key) {
             self.arriving.add_first(key);
         }
     }
 
-    /// Asks for all dropped samples around a chunk.
+    /// Requests all dropped samples around a chunk.
     fn revive_around(&mut self, key: ChunkKey) {
         key.around().for_each(|near| self.revive(near));
     }
 
-    /// Sees to what a chunk lacks before others.
+    /// Moves the missing samples of a chunk to the front of the queue.
     pub(super) fn look_at(&mut self, key: ChunkKey) {
         self.arriving.add_first(key);
     }

@@ -1,4 +1,4 @@
-//! [`Groups`]: what changed together is meshed from one snapshot and shown together.
+//! [`Groups`]: chunks that changed together, meshed from one snapshot and shown together.
 
 use core::mem;
 use core::time::Duration;
@@ -13,21 +13,21 @@ use crate::chunk::ChunkKey;
 use crate::jobs::{Ticket, new_number};
 use crate::stats::RequestTime;
 
-/// The changed chunks that wait to be meshed, and those that are being meshed.
+/// The changed chunks that wait to be meshed, and the groups that are being meshed.
 ///
-/// No chunk is in two pending sets, or claimed by two running groups, so results can never be shown out of order.
+/// No chunk is in two pending sets, or claimed by two running groups, so results cannot be shown out of order.
 #[derive(Default)]
 pub(crate) struct Groups {
     /// Changed chunks, in the order of their changes.
     pending: BTreeMap<u64, Pending>,
-    /// Which pending set a chunk is in.
+    /// The pending set of each waiting chunk.
     waiting: HashMap<ChunkKey, u64>,
     running: BTreeMap<u64, Group>,
-    /// Which group works on a chunk.
+    /// The running group that claims each chunk.
     claims: HashMap<ChunkKey, u64>,
-    /// How many running groups give way to edits.
+    /// The number of running groups that give way to edits.
     yielding: usize,
-    /// Whether some pending set may have become free; those up to this one have been looked at since.
+    /// Whether a pending set may have become free; those up to `looked_at` have been checked since.
     is_awake: bool,
     looked_at: u64,
 }
@@ -36,37 +36,37 @@ pub(crate) struct Groups {
 #[derive(Debug, Default)]
 pub(crate) struct Pending {
     pub(crate) chunks: BTreeSet<ChunkKey>,
-    /// Those of them whose meshes, where they have been drawn, stay as they are.
+    /// The chunks of the set whose meshes, if drawn, do not change.
     pub(crate) unchanged_meshes: BTreeSet<ChunkKey>,
-    /// When the first of the edits was asked for; `None` where none was.
+    /// The time of the first edit in the set; `None` without edits.
     pub(crate) since: Option<RequestTime>,
 }
 
 /// Chunks that are being meshed from one snapshot, to be shown in one update.
 pub(crate) struct Group {
-    /// The chunks that it claims: its members, and those that cannot be meshed yet.
+    /// The claimed chunks: the members, and those that cannot be meshed yet.
     pub(super) chunks: BTreeSet<ChunkKey>,
-    /// The samples of its members and of the chunks around them, where they are not shown yet.
+    /// The samples of the members and of the chunks around them, unless they are shown already.
     pub(super) snapshot: BTreeMap<[i32; 3], GridChunk<i16>>,
-    /// The number of the appearance that its meshes have.
+    /// The appearance of its meshes.
     pub(super) appearance: u64,
     pub(super) since: Option<RequestTime>,
     pub(super) purpose: Purpose,
-    /// How many chunks will have been meshed when it is complete.
+    /// The number of chunks to be meshed before the group is complete.
     pub(super) members: usize,
     pub(super) meshed: Vec<ChunkMesh>,
-    /// The rights to its jobs' results.
+    /// The tickets of its jobs.
     pub(super) tickets: Vec<Ticket>,
 }
 
-/// Why chunks are meshed.
+/// The reason why chunks are meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// Their samples have changed.
+    /// The samples have changed.
     Edit,
     /// A chunk is drawn for the first time; gives way to edits.
     FirstMesh,
-    /// A chunk gets another look; gives way to edits.
+    /// A chunk gets another appearance; gives way to edits.
     Restyle,
 }
 
@@ -80,14 +80,14 @@ impl Purpose {
 pub(crate) struct ChunkMesh {
     pub(crate) position: [i32; 3],
     pub(crate) geometry: Arc<MeshBuffer>,
-    /// The same as an asset, where assets are wanted and there is something to draw.
+    /// The mesh as an asset, if assets are wanted and there is something to draw.
     pub(crate) mesh: Option<Mesh>,
-    /// How long it took.
+    /// The time that meshing took.
     pub(crate) time: Duration,
 }
 
 impl ChunkMesh {
-    /// Nothing to draw.
+    /// A mesh with nothing to draw.
     pub(crate) fn empty(position: [i32; 3]) -> Self {
         Self { position, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
     }
@@ -98,17 +98,17 @@ impl Groups {
         self.pending.is_empty() && self.running.is_empty()
     }
 
-    /// How many chunks wait to be meshed or are being meshed.
+    /// The number of chunks that wait to be meshed or are being meshed.
     pub(crate) fn len(&self) -> usize {
         self.waiting.len() + self.claims.len()
     }
 
-    /// Whether some pending set may start.
+    /// Whether a pending set may start.
     pub(super) const fn may_start(&self) -> bool {
         self.is_awake
     }
 
-    /// How many running groups give way to edits.
+    /// The number of running groups that give way to edits.
     pub(super) const fn yielding(&self) -> usize {
         self.yielding
     }
@@ -118,12 +118,12 @@ impl Groups {
         self.waiting.contains_key(&key)
     }
 
-    /// Whether a chunk is being meshed.
+    /// Whether a running group claims a chunk.
     pub(super) fn is_claimed(&self, key: ChunkKey) -> bool {
         self.claims.contains_key(&key)
     }
 
-    /// Notes that chunks have changed together; sets that overlap become one.
+    /// Records that chunks have changed together; overlapping sets merge.
     pub(super) fn add(&mut self, mut new: Pending) {
         if new.chunks.is_empty() {
             return;
@@ -136,7 +136,7 @@ impl Groups {
         self.wake();
     }
 
-    /// Lets the latest [free](Self::next_free) set wait again, until something wakes the groups.
+    /// Puts the latest [free](Self::next_free) set back, until something wakes the groups.
     pub(super) fn put_back(&mut self, pending: Pending) {
         self.insert(self.looked_at, pending);
     }
@@ -146,12 +146,12 @@ impl Groups {
         self.pending.insert(id, pending);
     }
 
-    /// Something has changed for which a pending set may wait.
+    /// Wakes pending sets: something that they may wait for has changed.
     pub(super) const fn wake(&mut self) {
         (self.is_awake, self.looked_at) = (true, 0);
     }
 
-    /// The next pending set on whose chunks nobody works. Groups that give way are withdrawn.
+    /// The next pending set without claimed chunks. Groups that give way are withdrawn.
     pub(super) fn next_free(&mut self) -> Option<Pending> {
         while self.is_awake {
             let Some(id) = self.pending.range(self.looked_at + 1..).next().map(|(id, _)| *id) else {
@@ -169,7 +169,7 @@ impl Groups {
         None
     }
 
-    /// Whether nobody works on chunks, once the groups that give way have done so.
+    /// Whether chunks are unclaimed once the groups that give way have done so.
     fn give_way(&mut self, chunks: &BTreeSet<ChunkKey>) -> bool {
         let claimed: BTreeSet<u64> = chunks.iter().filter_map(|key| self.claims.get(key)).copied().collect();
         claimed.into_iter().all(|id| self.withdraw(id))
@@ -184,8 +184,8 @@ impl Groups {
         gives_way
     }
 
-    /// A chunk is to be drawn no longer: withdraws the group that works on it if it gives way, or takes the chunk out of it. If
-    /// it comes back, its samples may be newer than the group's.
+    /// Takes in that a chunk is not to be drawn any more. A group that claims it and gives way is withdrawn; any other loses the
+    /// chunk. If the chunk comes back, its samples may be newer than the group's.
     pub(super) fn withdraw_from(&mut self, key: ChunkKey) {
         let Some(id) = self.claims.get(&key).copied() else { return };
         if !self.withdraw(id) {
@@ -194,7 +194,7 @@ impl Groups {
         }
     }
 
-    /// Starts a group, whose jobs go by its number.
+    /// Starts a group; its jobs carry its number.
     pub(super) fn start(&mut self, group: Group) -> u64 {
         let id = new_number();
         self.claims.extend(group.chunks.iter().map(|key| (*key, id)));
@@ -203,12 +203,12 @@ impl Groups {
         id
     }
 
-    /// A running group.
+    /// The running group with a number.
     pub(super) fn get_mut(&mut self, id: u64) -> Option<&mut Group> {
         self.running.get_mut(&id)
     }
 
-    /// Takes out a group, and frees the chunks that it claims.
+    /// Removes a group, and frees the chunks that it claims.
     pub(super) fn remove(&mut self, id: u64) -> Option<Group> {
         let group = self.running.remove(&id)?;
         group.chunks.iter().for_each(|key| _ = self.claims.remove(key));
@@ -219,7 +219,7 @@ impl Groups {
         Some(group)
     }
 
-    /// Forgets all groups, and returns their chunks; jobs that have not begun are withdrawn.
+    /// Removes all groups, and returns their chunks. Jobs that have not begun are withdrawn.
     pub(super) fn take_all(&mut self) -> Vec<Pending> {
         let Self { pending, running, .. } = mem::take(self);
         let of_group = |group: Group| {
@@ -229,7 +229,7 @@ impl Groups {
         running.into_values().map(of_group).chain(pending.into_values()).collect()
     }
 
-    /// All that holds of any groups.
+    /// Checks the invariants of any groups.
     #[cfg(test)]
     pub(super) fn check(&self) {
         for (id, pending) in &self.pending {
@@ -257,7 +257,7 @@ impl Group {
 }
 
 impl Pending {
-    /// Takes in all of another set. What looks the same after one change may not after the other.
+    /// Merges another set into this one. A mesh that one change leaves alone may be changed by the other.
     fn merge(&mut self, other: &mut Self) {
         self.unchanged_meshes.retain(|key| !other.chunks.contains(key) || other.unchanged_meshes.contains(key));
         other.unchanged_meshes.retain(|key| !self.chunks.contains(key) || self.unchanged_meshes.contains(key));

@@ -1,26 +1,26 @@
-//! [`KnownSigns`]: which samples of a chunk are known to lie on one side of the surface.
+//! [`KnownSigns`]: the samples of a chunk that are known to lie on one side of the surface.
 
 use marchless::{GridChunk, Weight as _};
 
-/// Of a chunk's samples, those of its lowest layer along each axis, and all of them: on which side of the surface they
-/// lie. `true`: inside; `None`: some here and some there, or not known.
+/// The side of the surface on which a chunk's samples lie: for its lowest layer along each axis, and for all samples.
+/// `true`: inside; `None`: on both sides, or not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct KnownSigns {
     lowest: [Option<bool>; 3],
     all: Option<bool>,
-    /// What they are the signs of.
+    /// The isovalue for which the signs hold.
     isovalue: f32,
 }
 
 impl KnownSigns {
     pub(crate) const UNKNOWN: Self = Self { lowest: [None; 3], all: None, isovalue: 0.0 };
 
-    /// The signs, if they are those of this isovalue.
+    /// The signs, if they hold for this isovalue; else unknown ones.
     pub(crate) fn at(self, isovalue: f32) -> Self {
         if self.isovalue == isovalue { self } else { Self::UNKNOWN }
     }
 
-    /// The signs of these samples.
+    /// The signs of a chunk's samples.
     pub(crate) fn of(chunk: &GridChunk<i16>, isovalue: f32) -> Self {
         match chunk {
             GridChunk::Uniform(voxel) => {
@@ -51,19 +51,19 @@ impl KnownSigns {
         }
     }
 
-    /// Whether some samples lie inside and some outside, for all that is known.
+    /// Whether the chunk may have samples on both sides.
     pub(crate) const fn may_have_surface(&self) -> bool {
         self.all.is_none()
     }
 
-    /// Whether no cell of a chunk has a surface, by its own signs and those of the chunks behind it: `behind(step)` is one
-    /// step behind it along the axes whose step is 1; `None` where that is not known.
+    /// Whether no cell of the chunk has a surface, by its own signs and those of the chunks behind it. `behind(step)`: the signs
+    /// of the chunk one step behind along the axes whose step is 1; `None` if unknown.
     pub(crate) fn are_without_surface(&self, behind: impl Fn([i32; 3]) -> Option<Self>) -> bool {
         let Some(inside) = self.all else { return false };
         (1..8).all(|step| {
             let step = [step & 1, step >> 1 & 1, step >> 2];
             let Some(signs) = behind(step) else { return false };
-            // Only the samples that are lowest along all these axes count; they are among those of each.
+            // Only the samples that are lowest along all these axes matter; each of the layers has them.
             (0..3).any(|axis| step[axis] == 1 && signs.lowest[axis] == Some(inside))
         })
     }

@@ -1,4 +1,4 @@
-//! How much memory samples take.
+//! The memory that samples take.
 
 use marchless::GridChunk;
 
@@ -6,13 +6,13 @@ use super::Heart;
 use super::samples::shares_samples;
 
 impl Heart {
-    /// How much memory the plugin's notes about chunks take, in bytes.
+    /// The memory that the records of chunks take, in bytes.
     pub(crate) fn notes_bytes(&self) -> usize {
         self.table.bytes()
     }
 
-    /// How much memory the samples of at most `most` chunks take, in bytes, from a position on; and the position where to
-    /// go on, if any are left.
+    /// The memory that the samples of at most `most` chunks take, in bytes, starting at a position; and the position to go on
+    /// from, if any are left.
     pub(crate) fn sample_bytes_from(&self, from: [i32; 3], most: usize) -> (usize, Option<[i32; 3]>) {
         let mut newest = self.samples.newest().chunks_from(from).peekable();
         let mut shown = self.samples.shown().chunks_from(from).peekable();
@@ -40,7 +40,7 @@ impl Heart {
     }
 }
 
-/// How much memory a chunk's samples take, in bytes.
+/// The memory that a chunk's samples take, in bytes.
 fn bytes_of(chunk: &GridChunk<i16>) -> usize {
     match chunk {
         GridChunk::Uniform(_) => 0,

@@ -1,4 +1,4 @@
-//! Groups start and are shown.
+//! Groups are started and shown.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,17 +14,17 @@ use crate::chunk::ChunkKey;
 use crate::jobs::Ticket;
 use crate::stats::RequestTime;
 
-/// A group that has not started, and those of its chunks that are to be meshed.
+/// A group before it starts, and its chunks that are to be meshed.
 pub(crate) struct PreparedGroup {
     pub(crate) group: Group,
     pub(crate) to_mesh: Vec<[i32; 3]>,
 }
 
-/// What a job has meshed.
+/// The result of a meshing job.
 pub(crate) enum MeshResult {
     /// A chunk of the group with this number.
     OfGroup(u64, ChunkMesh),
-    /// A chunk at the isovalue to come, with the number of its look.
+    /// A chunk meshed for the isovalue to come.
     Restyled(Restyled),
 }
 
@@ -33,36 +33,37 @@ pub(crate) struct Swap {
     pub(crate) key: ChunkKey,
     pub(crate) place: ShowTarget,
     pub(crate) meshed: ChunkMesh,
-    /// The number of the appearance that it has.
+    /// The appearance of the mesh.
     pub(crate) appearance: u64,
 }
 
-/// What is to be shown in one update.
+/// The meshes to be shown in one update.
 #[derive(Default)]
 pub(crate) struct Shown {
     pub(crate) swaps: Vec<Swap>,
-    /// When the edits among it were asked for, where there are some.
+    /// The request times of the edits among them.
     pub(crate) since: Vec<RequestTime>,
 }
 
 impl Heart {
-    /// Whether chunks wait to be meshed, or to be shown.
+    /// Whether chunks wait to be meshed or shown.
     pub(crate) fn has_to_mesh(&self) -> bool {
         self.groups.may_start() || self.table.ready_len() > 0 || !self.to_mesh.is_empty() || self.has_to_restyle()
     }
 
-    /// Whether meshes wait to be taken.
+    /// Whether results of meshing jobs wait to be taken.
     pub(crate) fn has_meshed(&self) -> bool {
         !self.meshed_later.is_empty() || !self.meshed.is_empty()
     }
 
-    /// Goes through the chunks that can be drawn and are not up to date, until it is late; those without a surface need no job.
+    /// Sorts the drawable chunks that are out of date, until the time is over. Chunks without a surface need no job; the others
+    /// wait to be meshed.
     pub(crate) fn sort_ready(&mut self, until: Instant) {
         let mut no_longer_drawn = BTreeSet::new();
         let mut done = 0;
         while let Some(key) = self.table.next_ready() {
             if self.groups.is_pending(key) || self.groups.is_claimed(key) {
-                // It is drawn with the others, and looked at again then.
+                // It is drawn with its set, and visited again then.
                 continue;
             }
             let is_empty = self.table.is_without_surface(key, self.isovalue)
@@ -83,7 +84,7 @@ impl Heart {
         self.groups.add(Pending { chunks: no_longer_drawn, ..Pending::default() });
     }
 
-    /// The next changed chunks on which nobody works.
+    /// The next changed chunks that no running group claims.
     pub(crate) fn next_changed(&mut self) -> Option<PreparedGroup> {
         while let Some(pending) = self.groups.next_free() {
             if let Some(prepared) = self.prepare(pending, Purpose::Edit) {
@@ -93,8 +94,8 @@ impl Heart {
         None
     }
 
-    /// The most urgent chunk that is to be drawn for the first time, or anew; `None` where none waits, or as many groups
-    /// that give way are under way as `limit` says. The second number: how urgent it is.
+    /// The most urgent chunk that is to be drawn for the first time or anew, and its urgency. `None` if none waits, or if `limit`
+    /// groups that give way are under way.
     pub(crate) fn next_first_mesh(&mut self, limit: usize) -> Option<(PreparedGroup, u32)> {
         while self.groups.yielding() < limit {
             let Self { to_mesh, cover, table, groups, .. } = self;
@@ -112,9 +113,9 @@ impl Heart {
         self.prepare(Pending { chunks: BTreeSet::from([key]), ..Pending::default() }, purpose)
     }
 
-    /// Finds what of changed chunks is to be meshed; `None` where that is nothing, or they have to wait for samples.
+    /// Prepares a group from changed chunks; `None` if none needs a new mesh, or they have to wait for samples.
     fn prepare(&mut self, pending: Pending, purpose: Purpose) -> Option<PreparedGroup> {
-        // What is drawn changes with the others: where samples around it are missing, all wait for them.
+        // All chunks of a set change together: if samples around a drawn one are missing, all wait for them.
         let lacking: Vec<ChunkKey> = pending
             .chunks
             .iter()
@@ -170,7 +171,7 @@ impl Heart {
         Some(PreparedGroup { group, to_mesh })
     }
 
-    /// Starts a group whose chunks are meshed in jobs. `start`: starts the job of the chunk at a position for the group with
+    /// Starts a group whose chunks are meshed in jobs. `start` starts the job for the chunk at a position, for the group with
     /// this number.
     pub(crate) fn start(&mut self, prepared: PreparedGroup, mut start: impl FnMut(&Self, u64, [i32; 3]) -> Ticket) {
         let PreparedGroup { group, to_mesh } = prepared;
@@ -181,8 +182,8 @@ impl Heart {
         }
     }
 
-    /// Takes what jobs have meshed, and returns groups that are complete. Those that give way are taken as long as
-    /// `may_take_more`; edits always.
+    /// Takes results of meshing jobs, and returns the groups that are complete. Results of groups that give way are taken while
+    /// `may_take_more` says so; results of edits always.
     pub(crate) fn take_meshed(
         &mut self,
         mut may_take_more: impl FnMut() -> bool,
@@ -229,20 +230,20 @@ impl Heart {
         Shown { swaps, since: since.into_iter().collect() }
     }
 
-    /// A chunk's mesh is on this new entity.
+    /// Notes the new entity of a chunk's mesh.
     pub(crate) fn spawned(&mut self, key: ChunkKey, drawn: DrawnMesh) {
         self.table.spawned(key, drawn);
         self.shown(key);
     }
 
-    /// Takes a new mesh, and tells where it is to be shown.
+    /// Takes in a new mesh, and says where it is to be shown.
     pub(super) fn swap(&mut self, meshed: ChunkMesh, appearance: u64) -> Swap {
         let key = ChunkKey::finest(meshed.position);
         self.has_shown = true;
         Swap { key, place: self.table.meshed(key, &meshed.geometry, appearance), meshed, appearance }
     }
 
-    /// What is shown of a chunk has changed.
+    /// Follows up on a change of a shown chunk.
     fn shown(&mut self, key: ChunkKey) {
         self.has_shown = true;
         self.table.look_again(key);
@@ -257,13 +258,13 @@ impl Heart {
         self.table.lacks_samples(key) && !matches!(self.table.shown(key), Some(super::table::Shown::Despawned))
     }
 
-    /// Where a chunk's mesh is shown at the moment.
+    /// The place where a chunk's mesh is shown at present.
     pub(crate) fn entity(&self, key: ChunkKey) -> Option<Entity> {
         self.table.drawn(key).map(|drawn| drawn.entity)
     }
 }
 
-/// Whether a chunk and all around it are certainly of one kind: that is asked without touching shared samples.
+/// Whether a chunk and all around it are uniform and equal, as far as can be told without reading samples.
 pub(super) fn is_uniform_around(grid: &Grid<i16>, position: [i32; 3]) -> bool {
     !matches!(grid.chunk(position), Some(GridChunk::Samples(_))) && grid.neighbourhood_view(position).is_uniform()
 }

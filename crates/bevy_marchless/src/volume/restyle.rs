@@ -1,10 +1,9 @@
 //! Colours, normals and isovalue change.
 //!
 //! New colours and normals *sweep* over the chunks one by one, since borders stay closed meanwhile. Colours need no new
-//! geometry. Another isovalue moves the whole surface, so that all chunks are meshed beside what is drawn, and swapped in
-//! one update, the *transition*. A stamp meanwhile is shown at the former isovalue, and its chunks are meshed for the new
-//! one again. Settings that change before the transition is done wait for its end: so something is shown however
-//! often they change.
+//! geometry. Another isovalue moves the whole surface: all chunks are meshed beside the drawn ones, and swapped in one
+//! update, the *transition*. A stamp meanwhile is shown at the former isovalue, and its chunks are meshed again for the new
+//! one. Settings that change before the transition ends wait for it, so that something is shown however often they change.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -18,9 +17,9 @@ use crate::chunk::ChunkKey;
 use crate::cover::UniqueQueue;
 use crate::jobs::{Ticket, new_number};
 
-/// How meshes look, apart from the isovalue.
+/// The appearance of meshes, apart from the isovalue.
 pub(super) struct Appearance {
-    /// Tells meshes that look otherwise.
+    /// The number that tells appearances apart.
     pub(super) number: u64,
     pub(super) normals: bool,
     pub(super) colors: Colors,
@@ -38,13 +37,13 @@ impl Default for Appearance {
     }
 }
 
-/// A change of the isovalue under way. Every leaf that is shown is waiting, lacking samples, being meshed, or meshed.
+/// A running change of the isovalue. Every shown leaf is waiting, lacks samples, is being meshed, or is done.
 pub(super) struct Transition {
     isovalue: f32,
     waiting: UniqueQueue,
-    /// Those whose surroundings are not filled.
+    /// The leaves whose neighbours are not all filled.
     lacking: HashSet<ChunkKey>,
-    /// Those that are being meshed, each with its job.
+    /// The leaves that are being meshed, each with its job.
     running: HashMap<ChunkKey, (u64, Ticket)>,
     done: HashMap<ChunkKey, (ChunkMesh, u64)>,
 }
@@ -55,36 +54,36 @@ impl Transition {
     }
 }
 
-/// A chunk meshed at the isovalue to come.
+/// A chunk meshed for the isovalue to come.
 pub(crate) struct Restyled {
     pub(crate) job: u64,
     pub(crate) meshed: ChunkMesh,
     pub(crate) appearance: u64,
 }
 
-/// A chunk that is to look otherwise.
+/// A chunk that is to get another appearance.
 pub(crate) enum Restyle {
-    /// It needs another mesh.
+    /// The chunk needs another mesh.
     Mesh(PreparedGroup),
-    /// Its geometry in other colours.
+    /// The chunk keeps its geometry and needs other colours.
     Recolor(ChunkKey, Group, Arc<MeshBuffer>),
 }
 
 impl Heart {
-    /// Changes whether meshes have normals, and their colours.
+    /// Changes the colours of meshes, and whether they have normals.
     pub(crate) fn set_appearance(&mut self, normals: bool, colors: Colors) {
         self.appearance = Appearance::new(normals, colors);
         let Self { table, to_restyle, .. } = self;
         table.entities().for_each(|(key, _)| to_restyle.push(key));
     }
 
-    /// Whether chunks are to look otherwise, or a transition may go on.
+    /// Whether chunks wait for another appearance, or a transition may go on.
     pub(super) fn has_to_restyle(&self) -> bool {
         !self.to_restyle.is_empty() || self.transition.is_some()
     }
 
-    /// The next chunk that is to look otherwise; `None` where none is, or as many groups that give way are under way as
-    /// `limit` says. `assets`: whether there are meshes to be coloured.
+    /// The next chunk that is to get another appearance; `None` if none is, or if `limit` groups that give way are under way.
+    /// `assets`: whether there are meshes to be coloured.
     pub(crate) fn next_restyle(&mut self, limit: usize, assets: bool) -> Option<Restyle> {
         while self.groups.yielding() < limit {
             let key = self.to_restyle.pop()?;
@@ -92,7 +91,7 @@ impl Heart {
                 continue;
             };
             if self.groups.is_pending(key) || self.groups.is_claimed(key) {
-                continue; // It is looked at again when it is shown.
+                continue; // It is visited again when it is shown.
             }
             let geometry = drawn.geometry.clone();
             if geometry.is_empty() || geometry.normals.is_empty() != self.appearance.normals {
@@ -129,7 +128,7 @@ impl Heart {
         }
     }
 
-    /// Changes the isovalue: once all that is drawn has been meshed for it.
+    /// Changes the isovalue, once every drawn chunk has been meshed for it.
     pub(crate) fn set_isovalue(&mut self, isovalue: f32) {
         match &self.transition {
             Some(transition) => self.next_isovalue = Some(isovalue).filter(|next| *next != transition.isovalue),
@@ -143,7 +142,7 @@ impl Heart {
         self.table.keys().filter(|key| self.table.is_shown(*key)).for_each(|key| waiting.push(key));
         if waiting.is_empty() {
             self.isovalue = isovalue;
-            // What is being meshed for the first time has the former one.
+            // Chunks that are being meshed for the first time have the former isovalue.
             self.restart_groups();
             return;
         }
@@ -151,7 +150,7 @@ impl Heart {
         self.transition = Some(Transition { isovalue, waiting, lacking, running, done });
     }
 
-    /// A chunk's samples, or what is shown of it, have changed: what was meshed for the isovalue to come is out of date.
+    /// Takes in that a chunk's samples, or its shown state, have changed: its mesh for the isovalue to come is out of date.
     pub(super) fn renew_in_transition(&mut self, key: ChunkKey) {
         if let Some(transition) = &mut self.transition
             && self.table.is_shown(key)
@@ -164,7 +163,7 @@ impl Heart {
         }
     }
 
-    /// A chunk is no longer drawn.
+    /// Takes in that a chunk is not drawn any more.
     pub(super) fn leave_transition(&mut self, key: ChunkKey) {
         if let Some(transition) = &mut self.transition {
             transition.running.remove(&key);
@@ -178,7 +177,7 @@ impl Heart {
         self.transition.as_ref().is_some_and(|transition| transition.lacking.contains(&key))
     }
 
-    /// Samples have come that the transition may have waited for.
+    /// Takes in samples that the transition may have waited for.
     pub(super) fn unblock_transition(&mut self, key: ChunkKey) {
         if let Some(transition) = self.transition.as_mut().filter(|transition| !transition.lacking.is_empty()) {
             for near in key.around().filter(|near| !self.table.lacks_samples(*near)) {
@@ -189,8 +188,8 @@ impl Heart {
         }
     }
 
-    /// The next chunk that is to be meshed for the isovalue to come, as long as no more than `limit` are: its job's number, and
-    /// how it is meshed.
+    /// The next chunk to be meshed for the isovalue to come, while at most `limit` are under way: its job's number, and the
+    /// settings of its mesh.
     pub(crate) fn next_in_transition(&mut self, limit: usize) -> Option<(ChunkKey, u64, MeshSettings)> {
         let settings = self.mesh_settings();
         loop {
@@ -210,19 +209,19 @@ impl Heart {
         }
     }
 
-    /// The number of the appearance that meshes get now.
+    /// The appearance that new meshes get.
     pub(crate) const fn appearance(&self) -> u64 {
         self.appearance.number
     }
 
-    /// A chunk is being meshed for the isovalue to come.
+    /// Notes that a chunk is being meshed for the isovalue to come.
     pub(crate) fn started_in_transition(&mut self, key: ChunkKey, job: u64, ticket: Ticket) {
         if let Some(transition) = &mut self.transition {
             transition.running.insert(key, (job, ticket));
         }
     }
 
-    /// A chunk has been meshed for the isovalue to come.
+    /// Takes in a chunk that a job has meshed for the isovalue to come.
     pub(crate) fn take_restyled(&mut self, restyled: Restyled) {
         let Restyled { job, meshed, appearance } = restyled;
         let key = ChunkKey::finest(meshed.position);
@@ -234,14 +233,14 @@ impl Heart {
         }
     }
 
-    /// Whether no more than `inline` chunks are missing for the transition's end, all of which can be meshed now.
+    /// Whether at most `inline` chunks are missing until the transition ends, and all of them can be meshed now.
     pub(crate) fn may_end_transition(&self, inline: usize) -> bool {
         self.transition.as_ref().is_some_and(|transition| {
             transition.running.is_empty() && transition.lacking.is_empty() && transition.waiting.len() <= inline
         })
     }
 
-    /// A chunk has been meshed at once for the isovalue to come.
+    /// Takes in a chunk that was meshed at once for the isovalue to come.
     pub(crate) fn meshed_in_transition(&mut self, meshed: ChunkMesh) {
         let appearance = self.appearance.number;
         if let Some(transition) = &mut self.transition {
@@ -249,8 +248,8 @@ impl Heart {
         }
     }
 
-    /// Shows all chunks at the new isovalue, if none is missing. They show the newest samples: what was to be meshed
-    /// at the former isovalue is among it.
+    /// Shows all chunks at the new isovalue, if none is missing. They show the newest samples, including chunks that were still
+    /// to be meshed at the former isovalue.
     pub(crate) fn end_transition(&mut self) -> Option<Shown> {
         let is_done = |transition: &mut Transition| transition.waiting() == 0;
         let Transition { isovalue, done, .. } = self.transition.take_if(is_done)?;
@@ -282,7 +281,7 @@ impl Heart {
         Some(shown)
     }
 
-    /// Has all groups start again, with settings that have changed.
+    /// Starts all groups again, with changed settings.
     fn restart_groups(&mut self) {
         for pending in self.groups.take_all() {
             pending.chunks.iter().for_each(|key| self.table.look_again(*key));
