@@ -1,4 +1,4 @@
-//! [`SampleStore`]: a terrain's samples, the newest and those shown, and what stamps have changed of them.
+//! [`SampleStore`]: a terrain's samples, the newest and the shown ones, and the edits that stamps made.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,38 +9,38 @@ use marchless::{DEFAULT_CHUNK_CELLS, Edit, Grid, GridChunk, NeighbourhoodView, Q
 use super::stamps::{LoggedStamp, StampLog};
 use crate::jobs::new_number;
 
-/// The samples of one terrain. Undo, saving and replication need no other part.
+/// The samples of one terrain. Undo, saving and replication need nothing else.
 ///
-/// A chunk's samples are *resident* or not; those that are hold every stamp. Those that are not are had from the source, and
-/// the stamps that concern them applied again in order, by a [`Replay`].
+/// A chunk's samples are *resident* or not. Resident samples hold every stamp. Other samples are made again by the source,
+/// and a [`Replay`] applies their stamps in order.
 pub(crate) struct SampleStore {
-    /// Resident chunks, with every stamp.
+    /// The resident chunks, with every stamp.
     newest: Grid<i16>,
-    /// As drawn, with those that chunks not drawn yet will have beside drawn ones.
+    /// The samples as drawn, and those that chunks to be drawn beside drawn ones will have.
     shown: Grid<i16>,
     log: StampLog,
-    /// Chunks that stamps have changed while they were resident.
+    /// The chunks that stamps have changed while they were resident.
     edited: HashMap<[i32; 3], KeptEdits>,
-    /// How many of them are held.
+    /// The number of edited chunks that are held.
     held: usize,
     pool: SamplePool,
-    /// Tells chunks sampled for an earlier source; 0 before the first.
+    /// The number of the present source; tells samples of earlier sources. 0 before the first.
     generation: u64,
 }
 
-/// What is kept of a chunk's edits.
+/// The record of a chunk's edits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum KeptEdits {
-    /// The stamps in the log: this many have changed it, and what those up to this number changed has been reported.
+    /// Stamps in the log: `changes` of them have changed the chunk, and the edits of those up to `reported` have been reported.
     Stamps { changes: u32, reported: u64 },
-    /// Its samples, wherever viewers are.
+    /// The samples themselves, wherever viewers are.
     Held,
 }
 
-/// When more stamps than this have changed a chunk, its samples stay instead: they take less memory.
+/// The number of stamps beyond which a chunk's samples stay instead: they take less memory then.
 pub(super) const MAX_STAMPS: u32 = 64;
 
-/// The stamps that a chunk's samples lack that come from the source.
+/// The stamps that a chunk's samples from the source still lack.
 pub(crate) struct Replay {
     position: [i32; 3],
     stamps: Vec<LoggedStamp>,
@@ -51,22 +51,22 @@ pub(crate) struct Replay {
     grid: Grid<i16>,
 }
 
-/// What a [`Replay`] has made.
+/// The result of a [`Replay`].
 pub(crate) struct Replayed {
     through: u64,
     changes: u32,
-    /// What those have changed that had not been reported.
+    /// The edit made by stamps that had not been reported.
     edit: Edit,
 }
 
-/// What one stamp has changed.
+/// The changes that one stamp made.
 pub(crate) struct StampChanges {
     pub(crate) edit: Edit,
     /// The chunks with changed samples.
     pub(crate) chunks: Vec<[i32; 3]>,
     /// The chunks whose meshes read changed samples.
     pub(crate) affected: BTreeSet<[i32; 3]>,
-    /// Chunks that are not resident, and have so many stamps that their samples should be had and kept.
+    /// Chunks that are not resident and have so many stamps that their samples should become resident and stay.
     pub(crate) crowded: Vec<[i32; 3]>,
 }
 
@@ -89,7 +89,7 @@ impl SampleStore {
         }
     }
 
-    /// No samples yet, of a grid like this empty one.
+    /// A store without samples. `empty`: a grid of the terrain's chunks.
     pub(super) fn of(grid: Grid<i16>) -> Self {
         Self::new(grid, new_number())
     }
@@ -99,7 +99,7 @@ impl SampleStore {
         &self.newest
     }
 
-    /// The samples as they are drawn.
+    /// The samples as drawn.
     pub(crate) const fn shown(&self) -> &Grid<i16> {
         &self.shown
     }
@@ -117,7 +117,7 @@ impl SampleStore {
         self.edited.get(&position) == Some(&KeptEdits::Held)
     }
 
-    /// Whether stamps concern a chunk that is not resident.
+    /// Whether the log has stamps for a chunk that is not resident.
     pub(super) fn needs_replay(&self, position: [i32; 3]) -> bool {
         self.log.concerns(position, self.newest.chunk_region(position), 0)
     }
@@ -127,14 +127,14 @@ impl SampleStore {
         self.newest.neighbourhood_view(position)
     }
 
-    /// Has other chunks be seen. Samples of the others stay until they are unloaded, or for good where they are held.
+    /// Changes the chunks that are seen. Samples of other chunks stay until they are unloaded; held ones stay for good.
     pub(super) fn resize(&mut self, extent: Region) {
         for grid in [&mut self.newest, &mut self.shown] {
             grid.set_bounds(Some(extent)).expect("the settings have been checked");
         }
     }
 
-    /// Begins anew: all samples come from another source, and what was edited is gone. What is shown stays.
+    /// Starts over with another source: all edits are lost. Shown samples stay.
     pub(super) fn refill(&mut self, empty: Grid<i16>) {
         self.newest = empty;
         self.edited.clear();
@@ -143,7 +143,7 @@ impl SampleStore {
         self.generation = new_number();
     }
 
-    /// What a chunk's samples lack when they come from the source.
+    /// The stamps that a chunk's samples from the source lack.
     pub(super) fn replay(&self, position: [i32; 3], empty: Grid<i16>) -> Replay {
         let reported = match self.edited.get(&position) {
             Some(KeptEdits::Stamps { reported, .. }) => *reported,
@@ -153,8 +153,8 @@ impl SampleStore {
         Replay { position, stamps, through: self.log.last(), reported, grid: empty }
     }
 
-    /// Takes in a chunk from the source, with the stamps that have been applied again; the rest are applied here.
-    /// Returns what has changed that had not been reported, and the chunks whose meshes read what the late stamps changed.
+    /// Takes in a chunk from the source with its replayed stamps, and applies the stamps that came since. Returns the edit that
+    /// had not been reported, and the chunks whose meshes read what the late stamps changed.
     pub(super) fn load(
         &mut self,
         position: [i32; 3],
@@ -171,21 +171,21 @@ impl SampleStore {
         (edit, self.newest.take_dirty())
     }
 
-    /// Gives up a chunk's samples, unless they stay.
+    /// Drops a chunk's samples, unless they are held.
     pub(super) fn unload(&mut self, position: [i32; 3]) {
         if !self.touches_boundary(position) {
             self.newest.remove_clean(position);
         }
     }
 
-    /// Gives up the samples with which a chunk is drawn.
+    /// Drops the samples with which a chunk is drawn.
     pub(super) fn unload_shown(&mut self, position: [i32; 3]) {
         if let Some(samples) = self.shown.remove_clean(position) {
             self.pool.keep(samples);
         }
     }
 
-    /// Shows samples of a chunk.
+    /// Makes samples the shown ones of a chunk.
     pub(super) fn show(&mut self, position: [i32; 3], chunk: GridChunk<i16>) {
         if !self.shown.chunk(position).is_some_and(|shown| shares_samples(shown, &chunk)) {
             self.unload_shown(position);
@@ -193,16 +193,15 @@ impl SampleStore {
         }
     }
 
-    /// Shows the newest samples of a chunk, where there are some.
+    /// Makes the newest samples of a chunk, if any, the shown ones.
     pub(super) fn show_newest(&mut self, position: [i32; 3]) {
         if let Some(chunk) = self.newest.chunk(position) {
             self.show(position, chunk.clone());
         }
     }
 
-    /// Applies a stamp to all resident chunks, and keeps it for the others, also beyond the extent, which may grow; but not
-    /// a stamp that lies wholly beyond. `before`: gets the chunks that it changes, as they were, unless they stand there
-    /// already.
+    /// Applies a stamp to all resident chunks, and logs it for the others, including those beyond the extent, which may grow.
+    /// A stamp that lies wholly beyond is not logged. `before` receives the changed chunks as they were, unless it has them.
     pub(super) fn stamp(
         &mut self,
         stamp: QuantisedStamp,
@@ -220,7 +219,7 @@ impl SampleStore {
         let region = region.intersection(&Grid::<i16>::largest(self.newest.chunk_cells()));
         let (number, stamp) = (self.log.next(), Arc::new(stamp));
         for position in self.resident_in(region) {
-            // A clone is made for the first change only: while it lives, the samples are copied to be changed.
+            // Only the first change makes a clone: while a clone lives, changing the samples copies them.
             let is_first = !before.contains_key(&position);
             let was = self.newest.chunk(position).filter(|_| is_first).cloned();
             let edit = self.change(position, number, &stamp);
@@ -242,7 +241,7 @@ impl SampleStore {
         changed
     }
 
-    /// Whether a chunk is not resident and has so many stamps that its samples take less.
+    /// Whether a chunk is not resident and has so many stamps that its samples take less memory.
     fn is_crowded(&self, position: [i32; 3]) -> bool {
         let stamps = || self.log.concerning(chunk_box(position), self.newest.chunk_region(position), 0).len();
         !self.is_resident(position) && stamps() > MAX_STAMPS as usize
@@ -253,14 +252,14 @@ impl SampleStore {
         self.newest.chunks_in(region).map(|(position, _)| position).collect()
     }
 
-    /// Applies a stamp to a resident chunk. What changes beyond the extent is not reported.
+    /// Applies a stamp to a resident chunk. Changes beyond the extent are not reported.
     fn change(&mut self, position: [i32; 3], number: u64, stamp: &QuantisedStamp) -> Edit {
         let edit = self.newest.apply_to_chunk(position, stamp, &mut self.pool);
         self.note_changes(position, u32::from(!edit.is_empty()), number, false);
         if is_seen(&self.newest, position) { edit } else { Edit::NONE }
     }
 
-    /// Notes that stamps up to a number have changed a chunk this many times; `afresh`: in all.
+    /// Notes that stamps up to a number have changed a chunk a number of times; `afresh`: in all, rather than in addition.
     fn note_changes(&mut self, position: [i32; 3], changes: u32, through: u64, afresh: bool) {
         if changes == 0 {
             return;
@@ -279,7 +278,7 @@ impl SampleStore {
 }
 
 impl Replay {
-    /// Applies the stamps to what the source gave, as the terrain's own samples would have taken them.
+    /// Applies the stamps to the source's samples, exactly as the terrain's own samples would have taken them.
     pub(crate) fn run(mut self, chunk: GridChunk<i16>) -> (GridChunk<i16>, Replayed) {
         let mut replayed = Replayed { through: self.through, ..Replayed::nothing() };
         if self.stamps.is_empty() || self.grid.insert_clean(self.position, chunk.clone()).is_err() {
@@ -316,7 +315,7 @@ fn count(region: Region) -> u64 {
     region.size().into_iter().map(u64::from).fold(1, u64::saturating_mul)
 }
 
-/// Whether two chunks are known to be the same without looking at their samples.
+/// Whether two chunks are known to be equal without reading their samples.
 pub(crate) fn shares_samples(a: &GridChunk<i16>, b: &GridChunk<i16>) -> bool {
     match (a, b) {
         (GridChunk::Uniform(a), GridChunk::Uniform(b)) => a == b,

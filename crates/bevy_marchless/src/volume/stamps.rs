@@ -5,38 +5,38 @@ use std::sync::Arc;
 use bevy_platform::collections::HashMap;
 use marchless::{QuantisedStamp, Region};
 
-/// The stamps that samples do not hold for good yet: those of chunks whose samples are not there, and those that are
-/// applied again when samples are had from the source again.
+/// The stamps that may still be needed: those of chunks that are not resident, and those to be replayed when samples come
+/// from the source again.
 ///
-/// A stamp stands once, at the node of a loose octree of chunks that is as large as the stamp's box at least: the box
-/// begins in the node, and ends in it or in one next to it. What concerns a chunk, or a box of any size, is found at
-/// eight nodes of each level that has stamps, however many stamps there are elsewhere.
+/// Each stamp is stored once, in a loose octree of chunks, at a node at least as large as the stamp's box: the box begins in
+/// the node, and ends in it or in a neighbour. The stamps of a chunk, or of a box of any size, are found at eight nodes of
+/// each level that has stamps, however many stamps there are elsewhere.
 #[derive(Debug, Default)]
 pub(crate) struct StampLog {
     nodes: HashMap<Node, Vec<LoggedStamp>>,
-    /// How many nodes of each level hold stamps.
+    /// The number of nodes with stamps on each level.
     levels: [usize; LEVELS],
-    /// The number of the latest stamp; they count up from 1.
+    /// The number of the latest stamp; numbers count up from 1.
     last: u64,
 }
 
-/// A stamp and its place in the order of all.
+/// A stamp and its number in the order of all stamps.
 #[derive(Clone, Debug)]
 pub(crate) struct LoggedStamp {
     pub(crate) number: u64,
     pub(crate) stamp: Arc<QuantisedStamp>,
-    /// How many chunks it may still have to be applied to; `MANY` of them are not counted.
+    /// The number of chunks that it may still have to be applied to; `MANY` is not counted down.
     chunks: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Node {
     level: u8,
-    /// In nodes of its level.
+    /// The node's position, in nodes of its level.
     position: [i32; 3],
 }
 
-/// Levels of nodes: 2³⁰ chunks of the finest level are more than there can be along an axis.
+/// The number of levels: 2³⁰ chunks of the finest level are more than there can be along an axis.
 const LEVELS: usize = 31;
 /// A stamp on more chunks than this stays for good.
 const MANY: u32 = 64;
@@ -53,8 +53,8 @@ impl StampLog {
         self.last
     }
 
-    /// Keeps a stamp. `region`: the chunks that it may change; not empty. `held`: how many of them need it no longer.
-    /// Returns how many stamps now stand at the node of one chunk, where it is that small.
+    /// Logs a stamp. `region`: the chunks that it may change; not empty. `held`: how many of them do not need it any more.
+    /// Returns the number of stamps at the node of one chunk, if the stamp is that small.
     pub(crate) fn insert(&mut self, number: u64, stamp: Arc<QuantisedStamp>, region: Region, held: u32) -> usize {
         let size = region.size();
         let all = size.into_iter().map(u64::from).product::<u64>();
@@ -62,7 +62,7 @@ impl StampLog {
         if chunks == 0 {
             return 0;
         }
-        // The smallest level whose nodes are as long as the box; on one that is 0, a box of two chunks has its place, too.
+        // The smallest level whose nodes are as long as the box. On level 0 a box of two chunks fits, too.
         let longest = size.into_iter().max().unwrap_or(1);
         let level = (longest - 1).max(1).next_power_of_two().ilog2().min(LEVELS as u32 - 1);
         let node = Node { level: level as u8, position: region.min.map(|v| v >> level) };
@@ -74,7 +74,7 @@ impl StampLog {
         if level == 0 { logged.len() } else { 0 }
     }
 
-    /// Whether some stamp after number `after` may change a chunk's points, of which `points` are a box around.
+    /// Whether any stamp after number `after` may change points of a chunk. `points`: a box around them.
     pub(crate) fn concerns(&self, chunk: [i32; 3], points: Region, after: u64) -> bool {
         let mut found = false;
         self.each_near(one(chunk), &mut |logged| found |= after_in(logged, points, after).next().is_some());
@@ -89,7 +89,7 @@ impl StampLog {
         all
     }
 
-    /// Notes that a chunk holds all stamps so far for good: those that no other chunk waits for are forgotten.
+    /// Notes that a chunk holds all stamps so far for good. Stamps that no other chunk needs are removed.
     pub(crate) fn release(&mut self, chunk: [i32; 3], points: Region) {
         let Self { nodes, levels, .. } = self;
         for node in nodes_near(levels, one(chunk)) {
@@ -107,18 +107,18 @@ impl StampLog {
         }
     }
 
-    /// Forgets all stamps; numbers go on.
+    /// Removes all stamps; numbers continue.
     pub(crate) fn clear(&mut self) {
         *self = Self { last: self.last, ..Self::default() };
     }
 
-    /// How many stamps there are.
+    /// The number of stamps.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         self.nodes.values().map(Vec::len).sum()
     }
 
-    /// Goes through the nodes that may hold stamps on some of `chunks`.
+    /// Visits the nodes that may hold stamps on some of `chunks`.
     fn each_near(&self, chunks: Region, appearance: &mut impl FnMut(&[LoggedStamp])) {
         let near = (0..).zip(&self.levels).filter(|(_, nodes)| **nodes > 0);
         for (level, nodes) in near {
@@ -135,13 +135,13 @@ impl StampLog {
     }
 }
 
-/// The nodes that may hold stamps on some of `chunks`, whether there are any or not.
+/// The nodes that may hold stamps on some of `chunks`, whether or not they have any.
 fn nodes_near(levels: &[usize; LEVELS], chunks: Region) -> Vec<Node> {
     let levels = (0..).zip(levels).filter(|(_, nodes)| **nodes > 0).map(|(level, _)| level);
     levels.flat_map(|level| around(level, chunks).points().map(move |position| Node { level, position })).collect()
 }
 
-/// The nodes of a level in which a box may begin that reaches some of `chunks`.
+/// The nodes of a level in which a box that reaches some of `chunks` may begin.
 fn around(level: u8, chunks: Region) -> Region {
     let first = chunks.min.map(|v| (v >> level).saturating_sub(1));
     Region::new(first, chunks.max.map(|v| (v.saturating_sub(1) >> level).saturating_add(1)))
@@ -151,7 +151,7 @@ fn one(chunk: [i32; 3]) -> Region {
     Region::new(chunk, chunk.map(|v| v.saturating_add(1)))
 }
 
-/// Stamps of a node stand in order.
+/// The stamps of a node are in order.
 fn after_in(logged: &[LoggedStamp], points: Region, after: u64) -> impl Iterator<Item = &LoggedStamp> {
     let start = logged.partition_point(|logged| logged.number <= after);
     logged[start..].iter().filter(move |logged| !logged.stamp.region().intersection(&points).is_empty())

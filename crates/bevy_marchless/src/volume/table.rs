@@ -1,4 +1,4 @@
-//! [`ChunkTable`]: every loaded chunk of a terrain, and how far it is.
+//! [`ChunkTable`]: every loaded chunk of a terrain, and its state.
 
 mod ask;
 mod entry;
@@ -21,46 +21,46 @@ use crate::jobs::Ticket;
 
 /// Every loaded chunk of a terrain. Each event is one function; all counts are kept here.
 ///
-/// A chunk *can be drawn* once its own samples and those of all chunks around it are resident, as far as there are any.
+/// A chunk *can be drawn* when its own samples and those of all existing chunks around it are resident.
 pub(crate) struct ChunkTable {
-    /// The chunks that there are.
+    /// The chunks that exist.
     extent: Region,
-    /// Whether somebody makes meshes; else chunks wait for none.
+    /// Whether chunks are meshed at all; else they do not wait for meshes.
     makes_meshes: bool,
     chunks: ChunkMap,
-    /// Chunks that can be drawn, and of which what is shown is not up to date; each once, some stale.
+    /// Chunks that can be drawn and whose shown state is out of date; each once, some stale.
     ready: UniqueQueue,
     counts: Counts,
-    /// Entities that nothing is shown on any more.
+    /// Entities to be despawned.
     released: Vec<Entity>,
 }
 
-/// What became of a job that samples, when its chunk was let go.
+/// The state of a chunk's sampling when the chunk was unloaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unloaded {
-    /// There was none.
+    /// No job was requested.
     Nothing,
-    /// It has been withdrawn.
+    /// A job was withdrawn.
     Job,
-    /// The samples are there.
+    /// The samples were there.
     Samples,
 }
 
-/// Where to show a mesh.
+/// The entity that a mesh is to be shown on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ShowTarget {
-    /// Nowhere: there is nothing to show, or nobody wants it any more.
+    /// None: there is nothing to show, or the chunk is not wanted any more.
     Nowhere,
-    /// On its entity.
+    /// The chunk's entity.
     On(Entity),
-    /// On its entity, whose geometry stays as it is.
+    /// The chunk's entity, whose geometry stays.
     Recolored(Entity),
-    /// On a new entity.
+    /// A new entity.
     New,
 }
 
 impl ChunkTable {
-    /// An empty table. `extent`: the chunks that there are. `makes_meshes`: whether somebody makes meshes.
+    /// An empty table. `extent`: the chunks that exist. `makes_meshes`: whether chunks are meshed at all.
     pub(super) fn new(extent: Region, makes_meshes: bool) -> Self {
         Self {
             extent,
@@ -72,12 +72,12 @@ impl ChunkTable {
         }
     }
 
-    /// Whether somebody makes meshes.
+    /// Whether chunks are meshed at all.
     pub(super) const fn makes_meshes(&self) -> bool {
         self.makes_meshes
     }
 
-    /// The next of the chunks that can be drawn and are not up to date.
+    /// The next chunk that can be drawn and is out of date.
     pub(super) fn next_ready(&mut self) -> Option<ChunkKey> {
         while let Some(key) = self.ready.pop() {
             if self.is_ready(key) {
@@ -91,7 +91,7 @@ impl ChunkTable {
         self.ready.len()
     }
 
-    /// Entities to be despawned: nothing is shown on them any more.
+    /// Takes the entities to be despawned.
     pub(crate) fn take_released(&mut self) -> Vec<Entity> {
         mem::take(&mut self.released)
     }
@@ -100,7 +100,7 @@ impl ChunkTable {
         self.released.len()
     }
 
-    /// A chunk came into range.
+    /// Adds a chunk that came into range.
     pub(super) fn load(&mut self, key: ChunkKey, wanted: Residency) {
         let role = if wanted == Residency::Mesh { Role::NEW_LEAF } else { Role::Support };
         let entry = Entry { role, fill: Fill::Unasked, signs: KnownSigns::UNKNOWN, is_outdated: false };
@@ -111,7 +111,7 @@ impl ChunkTable {
         }
     }
 
-    /// A chunk that had samples only is to be drawn.
+    /// Makes a leaf of a chunk that had samples only.
     pub(super) fn promote(&mut self, key: ChunkKey) {
         self.change(key, |entry| {
             if matches!(entry.role, Role::Support) {
@@ -120,7 +120,7 @@ impl ChunkTable {
         });
     }
 
-    /// A leaf is to be drawn no longer, and stays for its neighbours.
+    /// Makes a leaf a chunk that only has samples, for its neighbours.
     pub(super) fn demote(&mut self, key: ChunkKey) {
         if let Some(drawn) = self.drawn(key) {
             self.released.push(drawn.entity);
@@ -131,7 +131,7 @@ impl ChunkTable {
         });
     }
 
-    /// A chunk went out of range.
+    /// Removes a chunk that went out of range.
     pub(super) fn unload(&mut self, key: ChunkKey) -> Unloaded {
         self.demote(key);
         let Some(entry) = self.chunks.remove(key) else { return Unloaded::Nothing };
@@ -143,17 +143,17 @@ impl ChunkTable {
         }
     }
 
-    /// A chunk's samples take a job, which waits for its turn.
+    /// Notes that a chunk's samples need a job, which waits for its turn.
     pub(super) fn queue(&mut self, key: ChunkKey) {
         self.change(key, |entry| entry.fill = Fill::Queued);
     }
 
-    /// The job that samples a chunk has been asked for.
+    /// Notes that the sampling job of a chunk was requested.
     pub(super) fn ask(&mut self, key: ChunkKey, job: u64, ticket: Ticket) {
         self.change(key, |entry| entry.fill = Fill::Asked(job, ticket));
     }
 
-    /// A chunk's samples are there. `signs`: where they are known.
+    /// Notes that a chunk's samples are there. `signs`: as far as they are known.
     pub(super) fn samples_arrived(&mut self, key: ChunkKey, signs: Option<KnownSigns>) {
         let was_filled = self.is_filled(key);
         self.change(key, |entry| {
@@ -171,14 +171,14 @@ impl ChunkTable {
         self.chunks.change(key, |entry| entry.signs = KnownSigns::UNKNOWN);
     }
 
-    /// A chunk's samples have been dropped; they can be had again.
+    /// Notes that a chunk's samples have been dropped; they can be made again.
     pub(super) fn samples_dropped(&mut self, key: ChunkKey) {
         if self.is_filled(key) {
             self.change(key, |entry| entry.fill = Fill::Dropped);
         }
     }
 
-    /// Dropped samples are wanted again. Returns whether they had been dropped.
+    /// Notes that dropped samples are wanted again. Returns whether they had been dropped.
     pub(super) fn revive(&mut self, key: ChunkKey) -> bool {
         let is_dropped = self.is_dropped(key);
         if is_dropped {
@@ -187,7 +187,7 @@ impl ChunkTable {
         is_dropped
     }
 
-    /// What is shown of a leaf is older than its samples, and it is drawn anew as soon as it can be.
+    /// Marks a leaf as out of date; it is drawn anew as soon as it can be.
     pub(super) fn set_stale(&mut self, key: ChunkKey) {
         self.change(key, |entry| {
             if let Role::Leaf { shown: Shown::Empty | Shown::Mesh(_), is_stale } = &mut entry.role {
@@ -196,12 +196,12 @@ impl ChunkTable {
         });
     }
 
-    /// A chunk may be ready after all: looks again.
+    /// Checks again whether a chunk is ready.
     pub(super) fn look_again(&mut self, key: ChunkKey) {
         self.change(key, |_| {});
     }
 
-    /// A chunk is known to have nothing to draw. Returns whether it has nothing on the screen either; else nothing changes.
+    /// Notes that a chunk has nothing to draw. Returns whether nothing of it is on the screen; if something is, nothing changes.
     pub(super) fn set_empty(&mut self, key: ChunkKey) -> bool {
         let mut is_empty = false;
         self.change(key, |entry| {
@@ -217,7 +217,7 @@ impl ChunkTable {
         is_empty
     }
 
-    /// A chunk's mesh has the look of this number, though its geometry is what it was.
+    /// Notes that a chunk's mesh has another appearance; its geometry stays.
     pub(super) fn set_appearance(&mut self, key: ChunkKey, appearance: u64) {
         self.change(key, |entry| {
             if let Role::Leaf { shown: Shown::Mesh(drawn), .. } = &mut entry.role {
@@ -226,7 +226,7 @@ impl ChunkTable {
         });
     }
 
-    /// A chunk has been meshed, and is to be shown so. Returns where; for a new entity, [`spawned`](Self::spawned) follows.
+    /// Takes in a chunk's new mesh. Returns where to show it; for a new entity, [`spawned`](Self::spawned) must follow.
     pub(super) fn meshed(&mut self, key: ChunkKey, geometry: &Arc<MeshBuffer>, appearance: u64) -> ShowTarget {
         let mut place = ShowTarget::Nowhere;
         self.change(key, |entry| {
@@ -234,7 +234,7 @@ impl ChunkTable {
             if let Shown::Mesh(drawn) = shown
                 && Arc::ptr_eq(&drawn.geometry, geometry)
             {
-                // Its colours are other ones, but it is as old as it was.
+                // The colours changed, but the geometry is as old as before.
                 drawn.appearance = appearance;
                 place = ShowTarget::Recolored(drawn.entity);
                 return;
@@ -256,7 +256,7 @@ impl ChunkTable {
         place
     }
 
-    /// A chunk's mesh is on this new entity.
+    /// Notes the new entity of a chunk's mesh.
     pub(super) fn spawned(&mut self, key: ChunkKey, drawn: DrawnMesh) {
         self.change(key, |entry| {
             if let Role::Leaf { shown, .. } = &mut entry.role {
@@ -265,7 +265,7 @@ impl ChunkTable {
         });
     }
 
-    /// The game has despawned a chunk's entity.
+    /// Notes that the game has despawned a chunk's entity.
     pub(super) fn despawned(&mut self, key: ChunkKey, entity: Entity) {
         if self.drawn(key).is_some_and(|drawn| drawn.entity == entity) {
             self.change(key, |entry| {
@@ -275,12 +275,12 @@ impl ChunkTable {
         }
     }
 
-    /// There are other chunks. Those beyond are to be unloaded.
+    /// Changes the chunks that exist. The caller unloads those beyond.
     pub(super) fn resize(&mut self, extent: Region) {
         self.extent = extent;
     }
 
-    /// All samples are to be had anew. What is shown stays until then.
+    /// Marks all samples to be made anew. Everything shown stays until then.
     pub(super) fn refill(&mut self) {
         self.ready = UniqueQueue::default();
         let mut counts = Counts::default();
@@ -296,7 +296,7 @@ impl ChunkTable {
         self.counts = counts;
     }
 
-    /// Every change that counts goes through here: it keeps the counts and finds what becomes ready.
+    /// Changes an entry. Every change goes through here, which keeps the counts and finds chunks that become ready.
     fn change(&mut self, key: ChunkKey, change: impl FnOnce(&mut Entry)) {
         let Self { chunks, counts, .. } = self;
         let change = |entry: &mut Entry| {
@@ -312,13 +312,13 @@ impl ChunkTable {
         if self.makes_meshes {
             self.ready.push(key);
         } else {
-            // Nothing of the present source will be shown.
+            // Nothing of the present source will be shown of it.
             self.counts.outdated -= 1;
             self.chunks.change(key, |entry| entry.is_outdated = false);
         }
     }
 
-    /// All that holds of any table.
+    /// Checks the invariants of any table.
     #[cfg(test)]
     pub(super) fn check(&self) {
         let mut counts = Counts::default();

@@ -1,4 +1,4 @@
-//! What can be asked of a [`ChunkTable`]; nothing here changes it.
+//! Questions to a [`ChunkTable`]; nothing here changes it.
 
 use bevy_ecs::entity::Entity;
 
@@ -17,7 +17,7 @@ impl ChunkTable {
         self.chunks.len()
     }
 
-    /// How much memory it takes, in bytes.
+    /// The memory that the table takes, in bytes.
     pub(in crate::volume) fn bytes(&self) -> usize {
         self.chunks.bytes()
     }
@@ -30,7 +30,7 @@ impl ChunkTable {
         self.chunks.marks(key).is_loaded
     }
 
-    /// What there is of a chunk, as the cover sees it: a leaf that has not been drawn is no more than its samples.
+    /// The residency of a chunk as the cover sees it: a leaf that was never drawn counts as samples only.
     pub(in crate::volume) fn kept(&self, key: ChunkKey) -> Residency {
         match self.chunks.get(key) {
             None => Residency::Gone,
@@ -44,7 +44,7 @@ impl ChunkTable {
         is_current || waits
     }
 
-    /// What is shown of a leaf.
+    /// The shown state of a leaf.
     pub(in crate::volume) fn shown(&self, key: ChunkKey) -> Option<&Shown> {
         match &self.chunks.get(key)?.role {
             Role::Support => None,
@@ -64,7 +64,7 @@ impl ChunkTable {
         self.shown(key).map(Shown::state)
     }
 
-    /// Whether something is shown of a chunk, if only that it is empty.
+    /// Whether a chunk's shown state is known, even if it is empty.
     pub(in crate::volume) fn is_shown(&self, key: ChunkKey) -> bool {
         self.shown(key).is_some_and(|shown| !matches!(shown, Shown::Nothing))
     }
@@ -74,12 +74,12 @@ impl ChunkTable {
         self.chunks.marks(key).is_filled
     }
 
-    /// Whether a chunk is to be filled.
+    /// Whether a chunk still has to be filled.
     pub(in crate::volume) fn is_queued(&self, key: ChunkKey) -> bool {
         self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Queued))
     }
 
-    /// Whether nobody has seen to a chunk's samples.
+    /// Whether nothing has been done about a chunk's samples yet.
     pub(in crate::volume) fn is_unasked(&self, key: ChunkKey) -> bool {
         self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Unasked))
     }
@@ -93,7 +93,7 @@ impl ChunkTable {
         self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(number, _) if number == job))
     }
 
-    /// Whether samples of a chunk, or some around it, are missing.
+    /// Whether samples of a chunk, or of a chunk around it, are missing.
     pub(in crate::volume) fn lacks_samples(&self, key: ChunkKey) -> bool {
         self.contains(key) && !self.is_surrounded(key)
     }
@@ -103,7 +103,7 @@ impl ChunkTable {
         self.chunks.get(key).is_some_and(Entry::may_be_drawn) && self.is_surrounded(key)
     }
 
-    /// Whether a chunk can be drawn, and what is shown is not up to date.
+    /// Whether a chunk can be drawn and is out of date.
     pub(in crate::volume) fn is_ready(&self, key: ChunkKey) -> bool {
         self.makes_meshes && self.chunks.marks(key).waits && self.is_surrounded(key)
     }
@@ -113,18 +113,18 @@ impl ChunkTable {
         self.chunks.marks(key).waits && !self.is_surrounded(key)
     }
 
-    /// Whether a chunk and all around it have their samples, as far as there are any.
+    /// Whether a chunk and all existing chunks around it have their samples.
     pub(super) fn is_surrounded(&self, key: ChunkKey) -> bool {
         self.chunks.is_surrounded(key, &self.extent)
     }
 
-    /// Whether a chunk is as far as it gets if no more is wanted than this.
+    /// Whether a chunk has reached everything that a residency asks for.
     pub(in crate::volume) fn has_all(&self, key: ChunkKey, wanted: Residency) -> bool {
         let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
         if wanted == Residency::Mesh { is_current } else { is_loaded && !waits }
     }
 
-    /// Whether there is more of a chunk than this.
+    /// Whether a chunk has more than a residency asks for.
     pub(in crate::volume) fn has_more(&self, key: ChunkKey, most: Residency) -> bool {
         let Marks { is_loaded, is_current, waits, .. } = self.chunks.marks(key);
         match most {
@@ -134,7 +134,7 @@ impl ChunkTable {
         }
     }
 
-    /// Whether what is shown of a chunk is up to date, as far as is known without looking at groups.
+    /// Whether a chunk is up to date, as far as can be told without looking at groups.
     pub(in crate::volume) fn is_current(&self, key: ChunkKey) -> bool {
         self.chunks.marks(key).is_current
     }
@@ -151,7 +151,7 @@ impl ChunkTable {
         })
     }
 
-    /// All entities that something is shown on.
+    /// All entities that show something.
     pub(crate) fn entities(&self) -> impl Iterator<Item = (ChunkKey, Entity)> + '_ {
         self.chunks.iter().filter_map(|(key, entry)| match &entry.role {
             Role::Leaf { shown: Shown::Mesh(drawn), .. } => Some((key, drawn.entity)),

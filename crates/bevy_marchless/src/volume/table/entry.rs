@@ -1,4 +1,4 @@
-//! [`Entry`]: one loaded chunk, in states that make sense, and [`Counts`] of them.
+//! [`Entry`]: one loaded chunk, whose states cannot contradict each other; and [`Counts`] of them.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::cover::LeafState;
 use crate::jobs::Ticket;
 use crate::volume::KnownSigns;
 
-/// How many chunks of each kind there are.
+/// The numbers of chunks of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Counts {
     /// Chunks that wait for their samples.
@@ -34,25 +34,25 @@ pub(super) struct Entry {
     pub(super) is_outdated: bool,
 }
 
-/// What a chunk is loaded for.
+/// The reason why a chunk is loaded.
 #[derive(Debug)]
 pub(super) enum Role {
-    /// Its samples alone, for the meshes of its neighbours.
+    /// Its samples, for the meshes of its neighbours.
     Support,
-    /// To be drawn. Stale: what is shown is older than the samples, because some around it were missing.
+    /// It is drawn. Stale: the shown state is older than the samples, because samples around it were missing.
     Leaf { shown: Shown, is_stale: bool },
 }
 
-/// What is shown of a leaf.
+/// The shown state of a leaf.
 #[derive(Clone, Debug)]
 pub(crate) enum Shown {
     /// Nothing yet.
     Nothing,
     /// There is nothing to draw, and never was.
     Empty,
-    /// A mesh on an entity; an empty one, where all was dug away.
+    /// A mesh on an entity; an empty mesh if everything was dug away.
     Mesh(DrawnMesh),
-    /// The game has despawned its entity: it is drawn no more.
+    /// The game has despawned its entity: it is not drawn any more.
     Despawned,
 }
 
@@ -61,22 +61,22 @@ pub(crate) enum Shown {
 pub(crate) struct DrawnMesh {
     pub(crate) entity: Entity,
     pub(crate) geometry: Arc<MeshBuffer>,
-    /// The number of the appearance that it has.
+    /// The appearance of the mesh.
     pub(crate) appearance: u64,
 }
 
-/// How far the samples of a chunk are.
+/// The state of a chunk's samples.
 #[derive(Debug)]
 pub(super) enum Fill {
-    /// Nobody has asked for them yet.
+    /// They have not been requested.
     Unasked,
-    /// They take a job, which waits for its turn.
+    /// They need a job, which waits for its turn.
     Queued,
-    /// The job that samples, by its number.
+    /// A job with this number samples them.
     Asked(u64, #[expect(dead_code, reason = "dropping it withdraws the job")] Ticket),
-    /// They are there.
+    /// They are resident.
     Resident,
-    /// They were there, and have been dropped.
+    /// They were resident, and have been dropped.
     Dropped,
 }
 
@@ -105,12 +105,12 @@ impl Entry {
         matches!(self.fill, Fill::Resident)
     }
 
-    /// Whether it is a leaf that is drawn where all samples are there.
+    /// Whether it is a leaf that is drawn once all samples are there.
     pub(super) const fn may_be_drawn(&self) -> bool {
         matches!(&self.role, Role::Leaf { shown, .. } if !matches!(shown, Shown::Despawned))
     }
 
-    /// Whether it is a leaf, and what is shown of it is not up to date.
+    /// Whether it is a leaf that is out of date.
     pub(super) const fn is_to_be_drawn(&self) -> bool {
         match &self.role {
             Role::Leaf { shown, is_stale } => self.may_be_drawn() && (*is_stale || matches!(shown, Shown::Nothing)),

@@ -1,4 +1,4 @@
-//! [`ChunkMap`]: the entries of a chunk table, and what is asked most about them in bits.
+//! [`ChunkMap`]: the entries of a chunk table, with the most frequent questions answered by bits.
 
 use bevy_platform::collections::HashMap;
 use marchless::Region;
@@ -6,31 +6,31 @@ use marchless::Region;
 use super::entry::Entry;
 use crate::chunk::ChunkKey;
 
-/// What is known of a chunk without its entry.
+/// The facts about a chunk that are kept as bits, beside its entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Marks {
     /// It has an entry.
     pub(super) is_loaded: bool,
     /// Its samples are resident.
     pub(super) is_filled: bool,
-    /// It is a leaf, and what is shown of it is up to date.
+    /// It is a leaf that is up to date.
     pub(super) is_current: bool,
-    /// It is a leaf, and what is shown of it is not up to date.
+    /// It is a leaf that is out of date.
     pub(super) waits: bool,
 }
 
-/// Entries by their chunks, in blocks of 4 × 4 × 4.
+/// The entries by chunk, in blocks of 4 × 4 × 4.
 ///
-/// Chunks lie close together: a block is found among few, and what is around a chunk is told from few words. Growing
-/// copies pointers to blocks, no entries.
+/// Chunks lie close together, so there are few blocks to search, and a few words tell the state of all chunks around one.
+/// Growing copies pointers to blocks, not entries.
 #[derive(Default)]
 pub(super) struct ChunkMap {
-    /// By their place in blocks. None is empty.
+    /// The blocks by their positions. No block is empty.
     blocks: HashMap<ChunkKey, Block>,
     len: usize,
 }
 
-/// Index of an entry: `x + 4·y + 16·z`.
+/// By the index of an entry in the block: `x + 4·y + 16·z`.
 struct Block {
     /// A word for each of the [`Marks`].
     loaded: u64,
@@ -48,7 +48,7 @@ impl ChunkMap {
         self.len
     }
 
-    /// How much memory it takes, in bytes.
+    /// The memory that the map takes, in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.blocks.len() * (size_of::<(ChunkKey, Block)>() + size_of::<[Option<Entry>; 64]>())
     }
@@ -95,7 +95,7 @@ impl ChunkMap {
         }
     }
 
-    /// Adds an entry, and returns the one that was there.
+    /// Adds an entry, and returns the former one, if any.
     pub(super) fn insert(&mut self, key: ChunkKey, entry: Entry) -> Option<Entry> {
         let (block, place) = place(key);
         let new = || Block { loaded: 0, filled: 0, current: 0, waits: 0, entries: Box::new([const { None }; 64]) };
@@ -133,7 +133,7 @@ impl ChunkMap {
         self.window::<3>(key, extent) == [[0b111; 3]; 3]
     }
 
-    /// Of the 3 × 3 × 3 chunks around one, those that are [surrounded](Self::is_surrounded).
+    /// The chunks of the 3 × 3 × 3 around one that are [surrounded](Self::is_surrounded).
     pub(super) fn surrounded_around(&self, key: ChunkKey, extent: &Region) -> impl Iterator<Item = ChunkKey> + use<> {
         let along_x = self.window::<5>(key, extent).map(|layer| layer.map(|row| row & row >> 1 & row >> 2));
         let along_y = along_x.map(|layer| [0, 1, 2].map(|y| layer[y] & layer[y + 1] & layer[y + 2]));
@@ -142,11 +142,11 @@ impl ChunkMap {
         key.around().zip(0..).filter(move |(_, index)| is_surrounded(*index)).map(|(near, _)| near)
     }
 
-    /// Which of the `N`³ chunks around one are filled; `N` is 5 at most. Those beyond `extent` count as filled.
+    /// The filled ones of the `N`³ chunks around one; `N` is at most 5. Chunks beyond `extent` count as filled.
     fn window<const N: usize>(&self, key: ChunkKey, extent: &Region) -> Window<N> {
         let corner = ChunkKey { position: key.position.map(|v| v.saturating_sub(N as i32 / 2)), ..key };
         let (block, [x, y, z]) = place(corner);
-        // Of two blocks per axis, the second only where the window reaches into it.
+        // Each axis has two blocks; the second is read only if the window reaches into it.
         let ends = [x, y, z].map(|start| (start + N - 1) / 4);
         let mut words = [[[0; 2]; 2]; 2];
         for (block_z, words) in words.iter_mut().enumerate().take(ends[2] + 1) {
@@ -185,7 +185,7 @@ impl Block {
     }
 }
 
-/// Fills what of a window lies beyond an extent.
+/// Sets the bits of a window that lie beyond an extent.
 fn fill_beyond<const N: usize>(window: &mut Window<N>, corner: [i32; 3], extent: &Region) {
     let is_beyond = |axis: usize, index: usize| {
         let position = corner[axis].saturating_add(index as i32);
@@ -199,7 +199,7 @@ fn fill_beyond<const N: usize>(window: &mut Window<N>, corner: [i32; 3], extent:
     }
 }
 
-/// The block that a chunk is in, and its place there.
+/// The block of a chunk, and the chunk's place in it.
 fn place(key: ChunkKey) -> (ChunkKey, [usize; 3]) {
     let ChunkKey { level, position } = key;
     (ChunkKey { level, position: position.map(|v| v >> 2) }, position.map(|v| (v & 3) as usize))
