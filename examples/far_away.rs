@@ -1,8 +1,8 @@
 //! Ten million voxels from the origin, and nothing shakes: terrain in a big space, chunk by chunk in its cells.
 //!
-//! Click to grab the mouse, then click to dig at the middle of the screen. W, A, S, D, Space and Shift fly, Esc frees the
-//! mouse. `--voxels N` goes so many voxels away along x and z; it looks the same anywhere. `--screenshot FILE.png` renders a
-//! picture and exits.
+//! Click to grab the mouse, then click to dig at the middle of the screen. W, A, S, D, Space and Shift fly, Esc frees
+//! the mouse. `--voxels N` goes so many voxels away along x and z; it looks the same anywhere. `--screenshot FILE.png`
+//! renders a picture and exits.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;

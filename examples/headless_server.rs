@@ -54,8 +54,8 @@ impl fmt::Display for Summary {
     }
 }
 
-/// Runs a server that applies so many stamps an update, and sums up its terrain when all is done; `None` where that takes
-/// longer than two minutes.
+/// Runs a server that applies so many stamps an update, and sums up its terrain when all is done; `None` where that
+/// takes longer than two minutes.
 fn replay(stamps_an_update: usize) -> Option<Summary> {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin, MarchlessPlugins));

@@ -1,7 +1,7 @@
 //! Many terrains side by side: asteroids that turn, and that can be dug while they do.
 //!
-//! Click to grab the mouse, then hold the left button to dig at the middle of the screen. W, A, S, D, Space and Shift fly,
-//! Esc frees the mouse. `--screenshot FILE.png` renders a picture and exits.
+//! Click to grab the mouse, then hold the left button to dig at the middle of the screen. W, A, S, D, Space and Shift
+//! fly, Esc frees the mouse. `--screenshot FILE.png` renders a picture and exits.
 
 use bevy::input::common_conditions::input_pressed;
 use bevy::prelude::*;

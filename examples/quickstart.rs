@@ -1,7 +1,7 @@
 //! Hills that you can dig: the least that a game needs.
 //!
-//! Click to grab the mouse, then click to dig at the middle of the screen. W, A, S, D, Space and Shift fly, Esc frees the
-//! mouse. `--screenshot FILE.png` renders a picture and exits.
+//! Click to grab the mouse, then click to dig at the middle of the screen. W, A, S, D, Space and Shift fly, Esc frees
+//! the mouse. `--screenshot FILE.png` renders a picture and exits.
 
 use bevy::input::common_conditions::input_just_pressed;
 use bevy::prelude::*;

@@ -1,9 +1,9 @@
 //! Case masks: by rows, by tiles, and by the word strides of the peer, at 256³.
 //!
-//! On one core of an AMD EPYC (Zen 4, AVX-512), shared with others: rows 2.0 ms and tiles 2.6 ms, whatever the field; the
-//! peer 6 ms on nothing, 39 ms on ground alone, 47 ms on caves, 53 ms on white noise. The same algorithm in C takes longer
-//! (gcc -O2: 58 ms on caves, 130 ms on white noise; -O3: 52 ms and 169 ms), since LLVM turns most of the branches into
-//! selections.
+//! On one core of an AMD EPYC (Zen 4, AVX-512), shared with others: rows 2.0 ms and tiles 2.6 ms, whatever the field;
+//! the peer 6 ms on nothing, 39 ms on ground alone, 47 ms on caves, 53 ms on white noise. The same algorithm in C takes
+//! longer (gcc -O2: 58 ms on caves, 130 ms on white noise; -O3: 52 ms and 169 ms), since LLVM turns most of the
+//! branches into selections.
 
 use core::{hint::black_box, time::Duration};
 use std::env;

@@ -3,12 +3,12 @@
 //! On caves of 256³ points, each of six neighbours. The peers:
 //! - a plain fill with a queue of points over bytes, one byte a point for the mask and one for what is filled; for the
 //!   components, one fill after the other, whose points are counted;
-//! - `ndarray-ndimage` (0.6): `label`, which is a pass over rows of points and one over labels. To fill from a seed, the
-//!   label of the seed is looked for among the others then.
+//! - `ndarray-ndimage` (0.6): `label`, which is a pass over rows of points and one over labels. To fill from a seed,
+//!   the label of the seed is looked for among the others then.
 //!
 //! No crate was found that fills a volume of bits. Others that were looked at: `building_blocks_search` (0.7.1, not
-//! maintained), whose `von_neumann_flood_fill3` takes 1.6 times as long as `label`; `scirs2-ndimage`, which labels point
-//! by point through a hash map; `fovea` and `imageproc`, which know images in two dimensions; graph crates
+//! maintained), whose `von_neumann_flood_fill3` takes 1.6 times as long as `label`; `scirs2-ndimage`, which labels
+//! point by point through a hash map; `fovea` and `imageproc`, which know images in two dimensions; graph crates
 //! (`petgraph`, `pathfinding`), to which every point is a node.
 
 use std::{collections::VecDeque, hint::black_box, time::Duration};

@@ -8,8 +8,8 @@
 //! words; the cell in front of the block is written to directly. The first pass assigns, the others skip words without
 //! a bit and write what has changed.
 //!
-//! The article's axes are called z, y and x from the innermost out; ours are x, y and z. With that, its order of corners
-//! (innermost axis first) is [`Corner`](marchless::cell::Corner)'s.
+//! The article's axes are called z, y and x from the innermost out; ours are x, y and z. With that, its order of
+//! corners (innermost axis first) is [`Corner`](marchless::cell::Corner)'s.
 
 use marchless::bits::BitGrid;
 

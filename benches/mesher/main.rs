@@ -9,9 +9,9 @@
 //! - isomesh (marching cubes) and isosurface (0.0.4, marching cubes) ask a function for each sample; see `peers.rs`.
 //! - For fields without a surface, reading the samples once (all of them, xor) is what nobody can undercut by much.
 //!
-//! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the default,
-//! and on terrain and caves of any size `MeshReport` examines the mesh, on as many threads as there are processors. Up to
-//! 128³, these alone take less than a minute:
+//! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the
+//! default, and on terrain and caves of any size `MeshReport` examines the mesh, on as many threads as there are
+//! processors. Up to 128³, these alone take less than a minute:
 //!
 //! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear)?$|MeshReport)'`
 //!

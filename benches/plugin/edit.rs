@@ -1,8 +1,8 @@
-//! An edit from end to end in a headless app: a stamp is written, and one update reads it, changes the samples, meshes the
-//! chunks that it touched, and inserts their new meshes.
+//! An edit from end to end in a headless app: a stamp is written, and one update reads it, changes the samples, meshes
+//! the chunks that it touched, and inserts their new meshes.
 //!
-//! The terrain is the default one of 8 × 4 × 8 chunks of 32 cells, filled with hills. Each stroke digs a ball
-//! into the surface and fills it again, so that the terrain stays as it is. Beside it stands an update in which nothing happens.
+//! The terrain is the default one of 8 × 4 × 8 chunks of 32 cells, filled with hills. Each stroke digs a ball into the
+//! surface and fills it again, so that the terrain stays as it is. Beside it stands an update in which nothing happens.
 //!
 //! And the ray that finds the ground for it, in an endless world of which a viewer sees 8 chunks far.
 

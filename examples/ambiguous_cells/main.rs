@@ -1,15 +1,15 @@
 //! One cell, its eight weights on sliders, and the surface that each topology makes of it, side by side.
 //!
-//! Three cubes stand for the same cell: meshed with `Topology::Separated`, with `Topology::Trilinear`, and the trilinear
-//! interpolant itself, sampled 32 times as fine. Corners inside are orange, corners outside blue, the larger the farther
-//! from the isovalue; the surface has the colour of the corners that it faces. Vertices on edges are white, those in the
-//! cell's interior magenta. Where a face's corners alternate, the first two cubes may differ, and the second agrees with
-//! the third.
+//! Three cubes stand for the same cell: meshed with `Topology::Separated`, with `Topology::Trilinear`, and the
+//! trilinear interpolant itself, sampled 32 times as fine. Corners inside are orange, corners outside blue, the larger
+//! the farther from the isovalue; the surface has the colour of the corners that it faces. Vertices on edges are white,
+//! those in the cell's interior magenta. Where a face's corners alternate, the first two cubes may differ, and the
+//! second agrees with the third.
 //!
 //! Drag to turn the cubes, the wheel zooms, R makes random ambiguous weights, F flips all signs.
 //!
-//! `--weights` and `--isovalue` choose the cell, `--screenshot` renders a picture without a window; without a display the
-//! figures are printed. See `--help`.
+//! `--weights` and `--isovalue` choose the cell, `--screenshot` renders a picture without a window; without a display
+//! the figures are printed. See `--help`.
 
 mod args;
 mod cell;

@@ -67,8 +67,8 @@ fn set_up(mut commands: Commands) {
     ));
 }
 
-/// Starts growing where the settings are no longer those of what is shown, or being made. What comes meanwhile waits, so
-/// that sliders move freely and only their last place counts.
+/// Starts growing where the settings are no longer those of what is shown, or being made. What comes meanwhile waits,
+/// so that sliders move freely and only their last place counts.
 fn grow(settings: Res<Settings>, mut growing: ResMut<Growing>) {
     if growing.task.is_some() || growing.settings.as_ref() == Some(&*settings) {
         return;

@@ -4,8 +4,8 @@ use bevy::prelude::*;
 use bevy_marchless::bits::prelude::*;
 use bevy_marchless::prelude::*;
 
-/// A island that has left the terrain. It falls by whole steps of the lattice as far as collisions go, and smoothly as far as
-/// one sees.
+/// A island that has left the terrain. It falls by whole steps of the lattice as far as collisions go, and smoothly as
+/// far as one sees.
 #[derive(Component)]
 pub(crate) struct Body {
     terrain: Entity,
@@ -26,8 +26,8 @@ pub(crate) struct Body {
 const GRAVITY: f32 = 40.0;
 /// Smaller islands are dug out, but become no bodies. [Units: cubic voxels]
 const DUST: usize = 12;
-/// How far around an edit islands are looked for: the whole terrain, since it is small. In a larger one, a snapshot's box
-/// would be searched in a task. [Units: voxels]
+/// How far around an edit islands are looked for: the whole terrain, since it is small. In a larger one, a snapshot's
+/// box would be searched in a task. [Units: voxels]
 const MARGIN: u32 = 128;
 /// Who falls so far has missed the terrain. [Units: voxels]
 const ABYSS: f32 = 300.0;
@@ -38,7 +38,8 @@ pub(crate) fn plugin(app: &mut App) {
         .add_systems(Update, (fall, free_pieces).chain());
 }
 
-/// Turns what an edit has left without support into bodies: in the same update they appear and are dug out of the terrain.
+/// Turns what an edit has left without support into bodies: in the same update they appear and are dug out of the
+/// terrain.
 fn free_pieces(
     mut edits: MessageReader<TerrainEdited>,
     bits: TerrainBits,

@@ -3,8 +3,8 @@
 //! Click to grab the mouse, Esc frees it. W, A, S, D, Space and Shift fly, Ctrl flies faster; the left button digs, R
 //! builds everything anew. Cut the mushroom's stem, or both legs of the gate. The text says how large each island is.
 //!
-//! `--screenshot` renders a picture without a window; without a display, or with `--headless`, the stem is cut by itself, and the
-//! island's volume and way are printed. See `--help`.
+//! `--screenshot` renders a picture without a window; without a display, or with `--headless`, the stem is cut by
+//! itself, and the island's volume and way are printed. See `--help`.
 
 mod args;
 mod bodies;

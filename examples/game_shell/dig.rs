@@ -21,8 +21,8 @@ pub(crate) fn plugin(app: &mut App) {
     app.init_resource::<Drill>().add_systems(FixedUpdate, drill);
 }
 
-/// The stamps say when they begin and end, in a time of their own: virtual time may be slowed down or stand still, and the
-/// same time drills the same hole.
+/// The stamps say when they begin and end, in a time of their own: virtual time may be slowed down or stand still, and
+/// the same time drills the same hole.
 fn drill(
     keys: Res<ButtonInput<KeyCode>>,
     time: Res<Time>,

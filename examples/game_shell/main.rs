@@ -1,13 +1,13 @@
 //! What a game does around its terrain: a menu, pausing, slow motion, a level that is hidden, Bevy's own picking, a map
 //! that sees only some terrains, and digging in `FixedUpdate`. One idea a file.
 //!
-//! Enter starts the level, Backspace goes back to the menu, and all of the level is gone. In the level: click to grab the
-//! mouse, Esc frees it; W, A, S, D, Space and Shift fly. E digs where Bevy's mesh ray cast hits a chunk, F held drills, H
-//! shows and hides a wall in front of the camera, P pauses, T slows time down; F5 saves the
-//! terrains as a scene, F9 loads them.
+//! Enter starts the level, Backspace goes back to the menu, and all of the level is gone. In the level: click to grab
+//! the mouse, Esc frees it; W, A, S, D, Space and Shift fly. E digs where Bevy's mesh ray cast hits a chunk, F held
+//! drills, H shows and hides a wall in front of the camera, P pauses, T slows time down; F5 saves the terrains as a
+//! scene, F9 loads them.
 //!
-//! Without a display, or with `--headless`, it presses these keys by itself and checks what comes of it; the exit code is 1
-//! where something is not as it should be.
+//! Without a display, or with `--headless`, it presses these keys by itself and checks what comes of it; the exit code
+//! is 1 where something is not as it should be.
 
 mod dig;
 mod headless;

@@ -21,8 +21,8 @@ pub(crate) fn plugin(app: &mut App) {
         .add_systems(Update, pick.run_if(input_just_pressed(KeyCode::KeyE)));
 }
 
-/// Digs where the camera looks: from the mesh to the chunk, from the chunk to its terrain, from the place in the world to
-/// one in the terrain.
+/// Digs where the camera looks: from the mesh to the chunk, from the chunk to its terrain, from the place in the world
+/// to one in the terrain.
 fn pick(
     camera: Single<&Transform, With<FlyCamera>>,
     mut meshes: MeshRayCast,

@@ -1,5 +1,5 @@
-//! Saving and loading: the terrains of the level are written as a scene, in RON, and read again. A terrain is its settings; it
-//! makes its own chunks, and what was dug is not written.
+//! Saving and loading: the terrains of the level are written as a scene, in RON, and read again. A terrain is its
+//! settings; it makes its own chunks, and what was dug is not written.
 
 use bevy::ecs::entity::EntityHashMap;
 use bevy::ecs::reflect::AppTypeRegistry;

@@ -68,8 +68,8 @@ fn try_run(world: &World, out: &Path) -> Result<(), Box<dyn core::error::Error>>
     Ok(())
 }
 
-/// From wall to wall along x, just below the middle of the ground's relief, a little downhill. A long tunnel takes several
-/// stamps, each within the length that brushes may have.
+/// From wall to wall along x, just below the middle of the ground's relief, a little downhill. A long tunnel takes
+/// several stamps, each within the length that brushes may have.
 fn tunnel(terrain: Entity, world: &World, size: Vec3) -> Vec<Stamp> {
     let [low, high] = world.relief();
     let end = |x: f32, share: f32| Vec3::new(x, low + share * (high - low), 0.5 * size.z);

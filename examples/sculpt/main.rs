@@ -1,8 +1,8 @@
 //! A landscape to dig: the main example.
 //!
 //! Click to grab the mouse, Esc frees it. W, A, S, D, Space and Shift fly, Ctrl flies faster. The left button digs, the
-//! right one adds, the middle one paints; the wheel sizes the brush, Q and E change the material. R makes a new world, C
-//! clears it to air.
+//! right one adds, the middle one paints; the wheel sizes the brush, Q and E change the material. R makes a new world,
+//! C clears it to air.
 //!
 //! `--heightmap` loads real elevation, `--screenshot` renders a picture without a window, and `--headless` runs without
 //! any renderer; see `--help`.

@@ -1,4 +1,5 @@
-//! The pictures of the page on sources, `crates/bevy_marchless/docs/sources.md`: what the functions of that page return.
+//! The pictures of the page on sources, `crates/bevy_marchless/docs/sources.md`: what the functions of that page
+//! return.
 //!
 //! `source_pictures SCENE FILE.png` renders one of them, without a window. All of them anew:
 //!

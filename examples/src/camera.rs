@@ -1,7 +1,7 @@
 //! [`FlyCamera`]: a camera that flies where one looks.
 //!
-//! A click grabs the mouse, Esc frees it. While it is grabbed the mouse turns the camera; W, A, S and D fly, Space rises,
-//! Shift sinks, and Ctrl flies faster.
+//! A click grabs the mouse, Esc frees it. While it is grabbed the mouse turns the camera; W, A, S and D fly, Space
+//! rises, Shift sinks, and Ctrl flies faster.
 
 use core::f32::consts::FRAC_PI_2;
 

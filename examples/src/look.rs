@@ -177,7 +177,8 @@ pub struct Scene {
     pub relief: [f32; 2],
     /// How large the scene is: shadows reach and fog begins as far. [Units: world]
     pub size: f32,
-    /// Where the world ends, if it does while one looks: fog hides everything from there on. [Units: world from the camera]
+    /// Where the world ends, if it does while one looks: fog hides everything from there on. [Units: world from the
+    /// camera]
     pub end: Option<f32>,
 }
 

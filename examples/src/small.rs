@@ -20,11 +20,11 @@ struct Arguments {
     screenshot: Option<PathBuf>,
 }
 
-/// An app with Bevy's default plugins, the plugin of [`fly_camera`](crate::camera::fly_camera), a blue sky and the light that
-/// comes from it, in a window of that title.
+/// An app with Bevy's default plugins, the plugin of [`fly_camera`](crate::camera::fly_camera), a blue sky and the
+/// light that comes from it, in a window of that title.
 ///
-/// With `--screenshot FILE.png` it has no window, renders one picture as soon as all terrains are drawn, and exits. Where there
-/// is no screen or no graphics adapter it says so and exits with code 1.
+/// With `--screenshot FILE.png` it has no window, renders one picture as soon as all terrains are drawn, and exits.
+/// Where there is no screen or no graphics adapter it says so and exits with code 1.
 pub fn app(title: &str) -> App {
     app_with(title, Arguments::parse().screenshot, |plugins| plugins)
 }

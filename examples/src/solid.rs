@@ -12,12 +12,12 @@ use marchless::{MeshBuffer, MeshSettings, Mesher, Region, Samples, Source, Sourc
 use crate::glb;
 use crate::look::linear;
 
-/// The surface of the set points of a grid, or of the solid ones of a region, in lattice coordinates: the first point is
-/// at 0.
+/// The surface of the set points of a grid, or of the solid ones of a region, in lattice coordinates: the first point
+/// is at 0.
 #[derive(Clone, Debug, Default)]
 pub struct Solid {
-    /// Positions, normals, triangles, and materials where there are any. All beyond the last points is empty, so that it is
-    /// closed.
+    /// Positions, normals, triangles, and materials where there are any. All beyond the last points is empty, so that
+    /// it is closed.
     pub mesh: MeshBuffer,
     /// Of each vertex, the share of unset points around: about 0.5 on a plane, less in a hollow, more on a ridge.
     pub openness: Vec<f32>,
@@ -84,8 +84,8 @@ impl Solid {
 
     /// Smooths the steps that bits leave. `held` says which coordinates of a vertex stay as they are.
     ///
-    /// After G. Taubin, "A signal processing approach to fair surface design" (1995): passes that shrink and passes that
-    /// grow take turns, so that the body keeps its size.
+    /// After G. Taubin, "A signal processing approach to fair surface design" (1995): passes that shrink and passes
+    /// that grow take turns, so that the body keeps its size.
     pub fn smooth(&mut self, passes: u32, held: impl Fn([f32; 3]) -> [bool; 3]) {
         let mesh = &mut self.mesh;
         let free: Vec<Vec3> =

@@ -1,6 +1,6 @@
-//! What `sculpt`, `ambiguous_cells`, `cellular_caves`, `falling_pieces` and `flyover` say and return: bad input gets one
-//! clear sentence and code 2, the headless runs make meshes without defects, `ambiguous_cells` prints its figures, what
-//! `falling_pieces` cuts loose comes to rest, and `flyover` counts what it loads. And the pictures of the pages of
+//! What `sculpt`, `ambiguous_cells`, `cellular_caves`, `falling_pieces` and `flyover` say and return: bad input gets
+//! one clear sentence and code 2, the headless runs make meshes without defects, `ambiguous_cells` prints its figures,
+//! what `falling_pieces` cuts loose comes to rest, and `flyover` counts what it loads. And the pictures of the pages of
 //! documentation are of the programs on them.
 
 mod common;

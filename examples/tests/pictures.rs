@@ -1,8 +1,8 @@
 //! Pictures of the examples, rendered for real: coarse features are compared, not exact pixels.
 //!
-//! Without a graphics adapter the tests skip with a printed line; with `MARCHLESS_REQUIRE_PICTURES=1` they fail instead.
-//! Pictures are kept in `MARCHLESS_PICTURES`, by default in the folder of tests in `target`. The height map is that of
-//! `MARCHLESS_TEST_DATA`, or a generated one.
+//! Without a graphics adapter the tests skip with a printed line; with `MARCHLESS_REQUIRE_PICTURES=1` they fail
+//! instead. Pictures are kept in `MARCHLESS_PICTURES`, by default in the folder of tests in `target`. The height map is
+//! that of `MARCHLESS_TEST_DATA`, or a generated one.
 
 mod common;
 

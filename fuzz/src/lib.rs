@@ -1,4 +1,5 @@
-//! What the fuzz targets share: volumes made from a fuzzer's bytes, and meshes down to the last bit; plain grids of bits.
+//! What the fuzz targets share: volumes made from a fuzzer's bytes, and meshes down to the last bit; plain grids of
+//! bits.
 
 mod plain;
 

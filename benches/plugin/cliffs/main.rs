@@ -1,8 +1,8 @@
 //! Situations in which a cost could grow with what is loaded, what waits or what was ever edited.
 //!
-//! Each runs in a headless app with mesh assets and default settings, sixty updates a second, while jobs sample and mesh
-//! on their threads. Measured is the CPU time of the main thread in the plugin's systems, their commands included, with a
-//! single-threaded executor for their schedule.
+//! Each runs in a headless app with mesh assets and default settings, sixty updates a second, while jobs sample and
+//! mesh on their threads. Measured is the CPU time of the main thread in the plugin's systems, their commands included,
+//! with a single-threaded executor for their schedule.
 //!
 //! ```text
 //! cargo bench -p marchless_plugin_benches --bench cliffs             # all of them, six minutes or more

@@ -105,7 +105,8 @@ impl Cover {
     }
 
     /// Changes the view of one viewer; `None` removes it. `come` receives the chunks that may now be wanted more than
-    /// before, and how much of them; `go` receives those that may be wanted less, and how much at most. Some come twice.
+    /// before, and how much of them; `go` receives those that may be wanted less, and how much at most. Some come
+    /// twice.
     ///
     /// Nothing of a view that is new or differs a lot comes before it is [revealed](Self::reveal) ring by ring: it may
     /// have any number of chunks.
@@ -201,7 +202,8 @@ impl Cover {
         self.near(position).any(|view| view.range.grown(0.0).contains(position))
     }
 
-    /// The residency that the views ask for, for a chunk that has residency `now`. A viewer's margin keeps what is there.
+    /// The residency that the views ask for, for a chunk that has residency `now`. A viewer's margin keeps what is
+    /// there.
     pub(crate) fn wanted(&self, position: [i32; 3], now: Residency) -> Residency {
         let asked = self.near(position).map(|view| {
             let grown = |by: f64| view.range.grown(by).contains(position);

@@ -1,11 +1,11 @@
 //! [`Heart`]: the state of one terrain and its transitions. It knows no system, no query and no command: systems report
 //! events to it, and carry out what it returns.
 //!
-//! Its parts own their state, and each is tested alone: [`SampleStore`] (the samples), [`ChunkTable`] (the state of each
-//! loaded chunk), [`Groups`] (chunks meshed together), [`Cover`] (wanted chunks). Events that involve several parts are
-//! functions here, by topic: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples arrive),
-//! [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle) (colours, normals
-//! and isovalue change).
+//! Its parts own their state, and each is tested alone: [`SampleStore`] (the samples), [`ChunkTable`] (the state of
+//! each loaded chunk), [`Groups`] (chunks meshed together), [`Cover`] (wanted chunks). Events that involve several
+//! parts are functions here, by topic: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples
+//! arrive), [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle)
+//! (colours, normals and isovalue change).
 
 mod edit;
 mod fill;
@@ -154,8 +154,8 @@ impl Heart {
         }
     }
 
-    /// Replaces all samples by those of another source. Edits are lost; a drawn chunk stays until its new mesh is there. The
-    /// chunks stay where they are.
+    /// Replaces all samples by those of another source. Edits are lost; a drawn chunk stays until its new mesh is
+    /// there. The chunks stay where they are.
     pub(crate) fn refill(&mut self, recipe: SamplingSettings, isovalue: f32) {
         self.samples.refill(recipe.empty_grid());
         self.table.refill();
@@ -179,8 +179,8 @@ impl Heart {
         self.recipe.as_ref().map(|recipe| recipe.extent)
     }
 
-    /// Whether the next source may begin: every chunk that existed when the present source began has been shown with it, and
-    /// at least one chunk if there is any to show.
+    /// Whether the next source may begin: every chunk that existed when the present source began has been shown with
+    /// it, and at least one chunk if there is any to show.
     pub(crate) fn is_generation_shown(&self) -> bool {
         let counts = self.table.counts();
         let may_show = self.table.makes_meshes() && counts.waiting + counts.empty + counts.drawn > 0;

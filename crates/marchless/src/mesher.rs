@@ -6,9 +6,9 @@
 //!                                          └─4 triangles─▶ one visit per active cell between two slabs
 //! ```
 //!
-//! All meshers share [`signs`](crate::signs) and [`active`](crate::active). The marching-cubes passes (`primal`) build on
-//! them. For [`Topology::Trilinear`], `trilinear` decides ambiguous cells by their weights. The passes work on one slab
-//! of samples after the other, while it is in the cache (`pipeline`).
+//! All meshers share [`signs`](crate::signs) and [`active`](crate::active). The marching-cubes passes (`primal`) build
+//! on them. For [`Topology::Trilinear`], `trilinear` decides ambiguous cells by their weights. The passes work on one
+//! slab of samples after the other, while it is in the cache (`pipeline`).
 //!
 //! Vertices are numbered slab by slab: first those on edges along z from the slab below, then those in the interior of
 //! cells, then those on edges along x, then those along y, each row by row. Triangles follow the cells, x fastest.

@@ -31,8 +31,8 @@ impl SignSweep {
         Self { slabs: [SlabSigns::new(), SlabSigns::new(), SlabSigns::new()] }
     }
 
-    /// Moves up by one slab. `first`: the current slab, if the sweep starts with it. `next`: the slab above, if there is
-    /// one. Both are whole slabs, padding included.
+    /// Moves up by one slab. `first`: the current slab, if the sweep starts with it. `next`: the slab above, if there
+    /// is one. Both are whole slabs, padding included.
     #[inline(always)]
     pub(crate) fn advance<S: Simd, W: Weight>(
         &mut self,

@@ -56,13 +56,13 @@ pub(crate) struct Args {
 
     /// Close the surface where it leaves the volume.
     ///
-    /// The space around the volume counts as outside: as above the isovalue, or with --invert as below it. Walls lie half
-    /// a sample beyond the outermost samples; beyond a sample that is equal to the isovalue, 1/1024 of one.
+    /// The space around the volume counts as outside: as above the isovalue, or with --invert as below it. Walls lie
+    /// half a sample beyond the outermost samples; beyond a sample that is equal to the isovalue, 1/1024 of one.
     #[arg(long)]
     pub(crate) close: bool,
 
-    /// Where the signs of a cell's corners leave open what is joined, do as the trilinear interpolant has it, rather than
-    /// separate what is inside.
+    /// Where the signs of a cell's corners leave open what is joined, do as the trilinear interpolant has it, rather
+    /// than separate what is inside.
     #[arg(long)]
     pub(crate) exact: bool,
 
@@ -75,8 +75,9 @@ pub(crate) struct Args {
 
     /// Print a report of the mesh's soundness; with any defect, write nothing and end with exit code 3.
     ///
-    /// Where the surface leaves the volume it may be open, unless --close closes it. Each chunk is examined by itself. The mesh is held in memory:
-    /// a layer of chunks at a time with --chunk, otherwise all of it. Examining it takes another 200 bytes a triangle.
+    /// Where the surface leaves the volume it may be open, unless --close closes it. Each chunk is examined by itself.
+    /// The mesh is held in memory: a layer of chunks at a time with --chunk, otherwise all of it. Examining it takes
+    /// another 200 bytes a triangle.
     #[arg(long)]
     pub(crate) check: bool,
 

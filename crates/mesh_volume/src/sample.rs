@@ -1,7 +1,8 @@
 //! [`Sample`]: how the samples of a file become weights, with the isovalue moved along and no sample changing sides.
 //!
-//! The mesher computes with integers of up to 16 bits and with `f32`. So samples of up to 16 bits stay exactly what they
-//! are. Of all others, the difference to the isovalue becomes an `f32`; what is rounded is that difference, to 24 bits.
+//! The mesher computes with integers of up to 16 bits and with `f32`. So samples of up to 16 bits stay exactly what
+//! they are. Of all others, the difference to the isovalue becomes an `f32`; what is rounded is that difference, to 24
+//! bits.
 
 #[cfg(test)]
 mod tests;

@@ -39,7 +39,8 @@ impl LoadRegion {
 
     /// The region together with every chunk at most `chunks` away from it along each axis.
     ///
-    /// This is exact for the ellipsoid, too: of a chunk's neighbours, the one that is nearest along each axis is a neighbour.
+    /// This is exact for the ellipsoid, too: of a chunk's neighbours, the one that is nearest along each axis is a
+    /// neighbour.
     #[must_use]
     pub(crate) fn grown(self, chunks: f64) -> GrownLoadRegion {
         GrownLoadRegion { range: self, by: chunks }

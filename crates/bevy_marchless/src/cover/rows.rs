@@ -42,7 +42,8 @@ impl Rows {
         start.and_then(|start| self.spans.get(start..start + self.count)).unwrap_or_default()
     }
 
-    /// Calls `take` with the chunks that `others` lack. `around`: rows whose own difference reports the chunks beyond them.
+    /// Calls `take` with the chunks that `others` lack. `around`: rows whose own difference reports the chunks beyond
+    /// them.
     fn difference(&self, others: &Self, around: Option<&Self>, take: &mut impl FnMut([i32; 3])) {
         let row_of = |rows: &Self, layer: &[[i32; 2]], y: i32| {
             // Before the first row, the index wraps to a number that no layer has.

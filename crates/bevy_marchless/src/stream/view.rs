@@ -24,8 +24,8 @@ pub(super) struct ViewFinder<'a> {
 }
 
 impl ViewFinder<'_> {
-    /// The view of a viewer; `None`, with a warning, if the settings or transforms are invalid. `known`: its latest view,
-    /// and the settings that it was made from.
+    /// The view of a viewer; `None`, with a warning, if the settings or transforms are invalid. `known`: its latest
+    /// view, and the settings that it was made from.
     pub(super) fn view(
         &mut self,
         terrain: Entity,

@@ -7,8 +7,8 @@ use marchless::Region;
 
 /// Which chunks a terrain has: positions from `min` up to, but without, `max`, in chunks.
 ///
-/// Outside of it there is air. What lies beyond the farthest lattice points that there can be, some two thousand million
-/// voxels from the origin, is left out: an axis that reaches so far is endless for all that a player can tell.
+/// Outside of it there is air. What lies beyond the farthest lattice points that there can be, some two thousand
+/// million voxels from the origin, is left out: an axis that reaches so far is endless for all that a player can tell.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;

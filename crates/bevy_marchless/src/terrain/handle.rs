@@ -33,11 +33,11 @@ impl SourceHandle {
         Self { source: Arc::new(source), name: None }
     }
 
-    /// The source that the game has registered in [`TerrainSources`] under a name, or will have by the time the terrain is
-    /// prepared.
+    /// The source that the game has registered in [`TerrainSources`] under a name, or will have by the time the terrain
+    /// is prepared.
     ///
-    /// A terrain whose name nobody has registered is refused with [`TerrainError::Source`], and stays as it is, a new one empty,
-    /// until somebody has. Another source under the same name fills the terrain anew.
+    /// A terrain whose name nobody has registered is refused with [`TerrainError::Source`], and stays as it is, a new
+    /// one empty, until somebody has. Another source under the same name fills the terrain anew.
     ///
     /// ```
     /// use bevy_marchless::prelude::*;

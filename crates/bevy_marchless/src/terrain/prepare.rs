@@ -15,8 +15,8 @@ use crate::volume::Heart;
 
 /// Checks terrains that are new or whose settings changed, and does what the change asks for.
 ///
-/// When settings were changed is compared with when those looked at last were, so that no change is missed that was made
-/// while the terrain was disabled.
+/// When settings were changed is compared with when those looked at last were, so that no change is missed that was
+/// made while the terrain was disabled.
 pub(crate) fn prepare_terrains(
     mut terrains: Query<(Entity, Ref<Terrain>, &mut TerrainVolume, Has<TerrainError>)>,
     mut transforms: Query<&mut Transform, With<Chunk>>,
@@ -97,12 +97,13 @@ fn place_chunks(terrain: &Terrain, heart: &Heart, transforms: &mut Query<&mut Tr
     }
 }
 
-/// Chunks that are not the plugin's own: copies, by cloning a terrain or by reading a scene, and what a game has put there.
+/// Chunks that are not the plugin's own: copies, by cloning a terrain or by reading a scene, and what a game has put
+/// there.
 #[derive(Resource, Default)]
 pub(crate) struct CopiedChunks(Vec<Entity>);
 
-/// Chunks are made, never copied: one that its terrain does not know of goes. Not at once, since somebody may be about to
-/// give it more components.
+/// Chunks are made, never copied: one that its terrain does not know of goes. Not at once, since somebody may be about
+/// to give it more components.
 pub(crate) fn note_copied_chunk(
     added: On<Add, Chunk>,
     chunks: Query<&Chunk, Allow<Disabled>>,

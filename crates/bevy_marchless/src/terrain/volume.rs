@@ -43,7 +43,8 @@ pub struct TerrainVolume {
 }
 
 impl TerrainVolume {
-    /// The newest samples, with every edit; perhaps not shown yet. Absent chunks are not filled, not loaded, or dropped.
+    /// The newest samples, with every edit; perhaps not shown yet. Absent chunks are not filled, not loaded, or
+    /// dropped.
     pub const fn grid(&self) -> &Grid<i16> {
         self.heart.samples().newest()
     }
@@ -92,7 +93,8 @@ impl TerrainVolume {
         !self.is_loading && self.next.is_none() && self.heart.is_settled()
     }
 
-    /// How much memory the samples take, in bytes: what is drawn, what is newest, and the plugin's notes about each chunk.
+    /// How much memory the samples take, in bytes: what is drawn, what is newest, and the plugin's notes about each
+    /// chunk.
     pub fn sample_bytes(&self) -> usize {
         self.heart.sample_bytes_from([i32::MIN; 3], usize::MAX).0 + self.heart.notes_bytes()
     }

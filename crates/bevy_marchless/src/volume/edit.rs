@@ -126,8 +126,8 @@ impl Heart {
         merged
     }
 
-    /// Whether all samples are resident that a change of these lattice points needs, or are being filled. Dropped samples are
-    /// requested again.
+    /// Whether all samples are resident that a change of these lattice points needs, or are being filled. Dropped
+    /// samples are requested again.
     pub(crate) fn has_samples_for(&mut self, changed: Region) -> bool {
         if !self.cover.drops_samples() || changed.is_empty() {
             return true;

@@ -80,7 +80,8 @@ impl Heart {
         !self.to_fill.is_empty() || !self.crowded.is_empty()
     }
 
-    /// Requests the samples of waiting chunks, the most urgent first, until `most` jobs are under way. `start` starts a job.
+    /// Requests the samples of waiting chunks, the most urgent first, until `limit` jobs are under way. `start` starts
+    /// a job.
     pub(crate) fn ask_for_samples(&mut self, limit: usize, mut start: impl FnMut(FillJob) -> Ticket) {
         let Some(recipe) = self.recipe.clone() else { return };
         while self.sampling < limit {

@@ -64,8 +64,8 @@ impl Heart {
         }
     }
 
-    /// Whether leaves wait though there is nothing left to do. They went out of range before they were drawn, and the margin
-    /// keeps only drawn chunks.
+    /// Whether leaves wait though there is nothing left to do. They went out of range before they were drawn, and the
+    /// margin keeps only drawn chunks.
     fn has_lost_leaves(&self) -> bool {
         self.table.makes_meshes() && self.table.counts().waiting > 0 && self.is_idle()
     }
@@ -77,7 +77,8 @@ impl Heart {
         lost.into_iter().for_each(|key| self.leaving.push(key));
     }
 
-    /// Reveals more of the new views that have few waiting chunks, and of at least one of them. Returns whether there was one.
+    /// Reveals more of the new views that have few waiting chunks, and of at least one of them. Returns whether there
+    /// was one.
     fn reveal(&mut self, until: Instant) -> bool {
         let Self { cover, table, arriving, .. } = self;
         let keeps_samples = !cover.drops_samples();
@@ -96,8 +97,8 @@ impl Heart {
         !few.is_empty()
     }
 
-    /// Changes the terrain's extent. Chunks inside both extents stay, with all edits; of those beyond, only the edits stay.
-    /// Walls appear and disappear chunk by chunk, as soon as the chunks around them are there.
+    /// Changes the terrain's extent. Chunks inside both extents stay, with all edits; of those beyond, only the edits
+    /// stay. Walls appear and disappear chunk by chunk, as soon as the chunks around them are there.
     pub(crate) fn resize(&mut self, extent: Region) {
         let Some(recipe) = &mut self.recipe else { return };
         let former = core::mem::replace(&mut recipe.extent, extent);
@@ -181,8 +182,8 @@ impl Heart {
         stats.loaded += 1;
     }
 
-    /// Loads missing neighbours of a leaf that only the margin keeps: they went before the viewer came back. Nothing else would
-    /// load them, and edits of the chunk would wait for them for ever.
+    /// Loads missing neighbours of a leaf that only the margin keeps: they went before the viewer came back. Nothing
+    /// else would load them, and edits of the chunk would wait for them for ever.
     fn load_lost_neighbours(&mut self, key: ChunkKey, extent: Region, stats: &mut TerrainStats) {
         // The missing neighbours of a chunk in range come anyway, once they have been reported.
         let comes = self.cover.is_revealed() && self.cover.contains(key.position);

@@ -184,8 +184,8 @@ impl Groups {
         gives_way
     }
 
-    /// Takes in that a chunk is not to be drawn any more. A group that claims it and gives way is withdrawn; any other loses the
-    /// chunk. If the chunk comes back, its samples may be newer than the group's.
+    /// Takes in that a chunk is not to be drawn any more. A group that claims it and gives way is withdrawn; any other
+    /// loses the chunk. If the chunk comes back, its samples may be newer than the group's.
     pub(super) fn withdraw_from(&mut self, key: ChunkKey) {
         let Some(id) = self.claims.get(&key).copied() else { return };
         if !self.withdraw(id) {

@@ -56,8 +56,8 @@ impl KnownSigns {
         self.all.is_none()
     }
 
-    /// Whether no cell of the chunk has a surface, by its own signs and those of the chunks behind it. `behind(step)`: the signs
-    /// of the chunk one step behind along the axes whose step is 1; `None` if unknown.
+    /// Whether no cell of the chunk has a surface, by its own signs and those of the chunks behind it. `behind(step)`:
+    /// the signs of the chunk one step behind along the axes whose step is 1; `None` if unknown.
     pub(crate) fn are_without_surface(&self, behind: impl Fn([i32; 3]) -> Option<Self>) -> bool {
         let Some(inside) = self.all else { return false };
         (1..8).all(|step| {

@@ -11,8 +11,8 @@ impl Heart {
         self.table.bytes()
     }
 
-    /// The memory that the samples of at most `most` chunks take, in bytes, starting at a position; and the position to go on
-    /// from, if any are left.
+    /// The memory that the samples of at most `most` chunks take, in bytes, starting at a position; and the position to
+    /// go on from, if any are left.
     pub(crate) fn sample_bytes_from(&self, from: [i32; 3], most: usize) -> (usize, Option<[i32; 3]>) {
         let mut newest = self.samples.newest().chunks_from(from).peekable();
         let mut shown = self.samples.shown().chunks_from(from).peekable();

@@ -56,8 +56,8 @@ impl Heart {
         !self.meshed_later.is_empty() || !self.meshed.is_empty()
     }
 
-    /// Sorts the drawable chunks that are out of date, until the time is over. Chunks without a surface need no job; the others
-    /// wait to be meshed.
+    /// Sorts the drawable chunks that are out of date, until the time is over. Chunks without a surface need no job;
+    /// the others wait to be meshed.
     pub(crate) fn sort_ready(&mut self, until: Instant) {
         let mut no_longer_drawn = BTreeSet::new();
         let mut done = 0;
@@ -94,8 +94,8 @@ impl Heart {
         None
     }
 
-    /// The most urgent chunk that is to be drawn for the first time or anew, and its urgency. `None` if none waits, or if `limit`
-    /// groups that give way are under way.
+    /// The most urgent chunk that is to be drawn for the first time or anew, and its urgency. `None` if none waits, or
+    /// if `limit` groups that give way are under way.
     pub(crate) fn next_first_mesh(&mut self, limit: usize) -> Option<(PreparedGroup, u32)> {
         while self.groups.yielding() < limit {
             let Self { to_mesh, cover, table, groups, .. } = self;
@@ -171,8 +171,8 @@ impl Heart {
         Some(PreparedGroup { group, to_mesh })
     }
 
-    /// Starts a group whose chunks are meshed in jobs. `start` starts the job for the chunk at a position, for the group with
-    /// this number.
+    /// Starts a group whose chunks are meshed in jobs. `start` starts the job for the chunk at a position, for the
+    /// group with this number.
     pub(crate) fn start(&mut self, prepared: PreparedGroup, mut start: impl FnMut(&Self, u64, [i32; 3]) -> Ticket) {
         let PreparedGroup { group, to_mesh } = prepared;
         let id = self.groups.start(group);
@@ -182,8 +182,8 @@ impl Heart {
         }
     }
 
-    /// Takes results of meshing jobs, and returns the groups that are complete. Results of groups that give way are taken while
-    /// `may_take_more` says so; results of edits always.
+    /// Takes results of meshing jobs, and returns the groups that are complete. Results of groups that give way are
+    /// taken while `may_take_more` says so; results of edits always.
     pub(crate) fn take_meshed(
         &mut self,
         mut may_take_more: impl FnMut() -> bool,

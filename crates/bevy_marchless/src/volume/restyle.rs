@@ -2,8 +2,9 @@
 //!
 //! New colours and normals *sweep* over the chunks one by one, since borders stay closed meanwhile. Colours need no new
 //! geometry. Another isovalue moves the whole surface: all chunks are meshed beside the drawn ones, and swapped in one
-//! update, the *transition*. A stamp meanwhile is shown at the former isovalue, and its chunks are meshed again for the new
-//! one. Settings that change before the transition ends wait for it, so that something is shown however often they change.
+//! update, the *transition*. A stamp meanwhile is shown at the former isovalue, and its chunks are meshed again for the
+//! new one. Settings that change before the transition ends wait for it, so that something is shown however often they
+//! change.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -82,8 +83,8 @@ impl Heart {
         !self.to_restyle.is_empty() || self.transition.is_some()
     }
 
-    /// The next chunk that is to get another appearance; `None` if none is, or if `limit` groups that give way are under way.
-    /// `assets`: whether there are meshes to be coloured.
+    /// The next chunk that is to get another appearance; `None` if none is, or if `limit` groups that give way are
+    /// under way. `assets`: whether there are meshes to be coloured.
     pub(crate) fn next_restyle(&mut self, limit: usize, assets: bool) -> Option<Restyle> {
         while self.groups.yielding() < limit {
             let key = self.to_restyle.pop()?;
@@ -150,7 +151,8 @@ impl Heart {
         self.transition = Some(Transition { isovalue, waiting, lacking, running, done });
     }
 
-    /// Takes in that a chunk's samples, or its shown state, have changed: its mesh for the isovalue to come is out of date.
+    /// Takes in that a chunk's samples, or its shown state, have changed: its mesh for the isovalue to come is out of
+    /// date.
     pub(super) fn renew_in_transition(&mut self, key: ChunkKey) {
         if let Some(transition) = &mut self.transition
             && self.table.is_shown(key)
@@ -188,8 +190,8 @@ impl Heart {
         }
     }
 
-    /// The next chunk to be meshed for the isovalue to come, while at most `limit` are under way: its job's number, and the
-    /// settings of its mesh.
+    /// The next chunk to be meshed for the isovalue to come, while at most `limit` are under way: its job's number, and
+    /// the settings of its mesh.
     pub(crate) fn next_in_transition(&mut self, limit: usize) -> Option<(ChunkKey, u64, MeshSettings)> {
         let settings = self.mesh_settings();
         loop {
@@ -248,8 +250,8 @@ impl Heart {
         }
     }
 
-    /// Shows all chunks at the new isovalue, if none is missing. They show the newest samples, including chunks that were still
-    /// to be meshed at the former isovalue.
+    /// Shows all chunks at the new isovalue, if none is missing. They show the newest samples, including chunks that
+    /// were still to be meshed at the former isovalue.
     pub(crate) fn end_transition(&mut self) -> Option<Shown> {
         let is_done = |transition: &mut Transition| transition.waiting() == 0;
         let Transition { isovalue, done, .. } = self.transition.take_if(is_done)?;

@@ -11,8 +11,8 @@ use crate::jobs::new_number;
 
 /// The samples of one terrain. Undo, saving and replication need nothing else.
 ///
-/// A chunk's samples are *resident* or not. Resident samples hold every stamp. Other samples are made again by the source,
-/// and a [`Replay`] applies their stamps in order.
+/// A chunk's samples are *resident* or not. Resident samples hold every stamp. Other samples are made again by the
+/// source, and a [`Replay`] applies their stamps in order.
 pub(crate) struct SampleStore {
     /// The resident chunks, with every stamp.
     newest: Grid<i16>,
@@ -31,7 +31,8 @@ pub(crate) struct SampleStore {
 /// The record of a chunk's edits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum KeptEdits {
-    /// Stamps in the log: `changes` of them have changed the chunk, and the edits of those up to `reported` have been reported.
+    /// Stamps in the log: `changes` of them have changed the chunk, and the edits of those up to `reported` have been
+    /// reported.
     Stamps { changes: u32, reported: u64 },
     /// The samples themselves, wherever viewers are.
     Held,
@@ -153,8 +154,8 @@ impl SampleStore {
         Replay { position, stamps, through: self.log.last(), reported, grid: empty }
     }
 
-    /// Takes in a chunk from the source with its replayed stamps, and applies the stamps that came since. Returns the edit that
-    /// had not been reported, and the chunks whose meshes read what the late stamps changed.
+    /// Takes in a chunk from the source with its replayed stamps, and applies the stamps that came since. Returns the
+    /// edit that had not been reported, and the chunks whose meshes read what the late stamps changed.
     pub(super) fn load(
         &mut self,
         position: [i32; 3],
@@ -200,8 +201,9 @@ impl SampleStore {
         }
     }
 
-    /// Applies a stamp to all resident chunks, and logs it for the others, including those beyond the extent, which may grow.
-    /// A stamp that lies wholly beyond is not logged. `before` receives the changed chunks as they were, unless it has them.
+    /// Applies a stamp to all resident chunks, and logs it for the others, including those beyond the extent, which may
+    /// grow. A stamp that lies wholly beyond is not logged. `before` receives the changed chunks as they were, unless
+    /// it has them.
     pub(super) fn stamp(
         &mut self,
         stamp: QuantisedStamp,
@@ -259,7 +261,8 @@ impl SampleStore {
         if is_seen(&self.newest, position) { edit } else { Edit::NONE }
     }
 
-    /// Notes that stamps up to a number have changed a chunk a number of times; `afresh`: in all, rather than in addition.
+    /// Notes that stamps up to a number have changed a chunk a number of times; `afresh`: in all, rather than in
+    /// addition.
     fn note_changes(&mut self, position: [i32; 3], changes: u32, through: u64, afresh: bool) {
         if changes == 0 {
             return;

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use bevy_platform::collections::HashMap;
 use marchless::{QuantisedStamp, Region};
 
-/// The stamps that may still be needed: those of chunks that are not resident, and those to be replayed when samples come
-/// from the source again.
+/// The stamps that may still be needed: those of chunks that are not resident, and those to be replayed when samples
+/// come from the source again.
 ///
-/// Each stamp is stored once, in a loose octree of chunks, at a node at least as large as the stamp's box: the box begins in
-/// the node, and ends in it or in a neighbour. The stamps of a chunk, or of a box of any size, are found at eight nodes of
-/// each level that has stamps, however many stamps there are elsewhere.
+/// Each stamp is stored once, in a loose octree of chunks, at a node at least as large as the stamp's box: the box
+/// begins in the node, and ends in it or in a neighbour. The stamps of a chunk, or of a box of any size, are found at
+/// eight nodes of each level that has stamps, however many stamps there are elsewhere.
 #[derive(Debug, Default)]
 pub(crate) struct StampLog {
     nodes: HashMap<Node, Vec<LoggedStamp>>,
@@ -53,8 +53,8 @@ impl StampLog {
         self.last
     }
 
-    /// Logs a stamp. `region`: the chunks that it may change; not empty. `held`: how many of them do not need it any more.
-    /// Returns the number of stamps at the node of one chunk, if the stamp is that small.
+    /// Logs a stamp. `region`: the chunks that it may change; not empty. `held`: how many of them do not need it any
+    /// more. Returns the number of stamps at the node of one chunk, if the stamp is that small.
     pub(crate) fn insert(&mut self, number: u64, stamp: Arc<QuantisedStamp>, region: Region, held: u32) -> usize {
         let size = region.size();
         let all = size.into_iter().map(u64::from).product::<u64>();
@@ -81,7 +81,8 @@ impl StampLog {
         found
     }
 
-    /// The stamps after number `after` that may change a box of chunks, in order. `points`: the lattice points of the box.
+    /// The stamps after number `after` that may change a box of chunks, in order. `points`: the lattice points of the
+    /// box.
     pub(crate) fn concerning(&self, chunks: Region, points: Region, after: u64) -> Vec<LoggedStamp> {
         let mut all = Vec::new();
         self.each_near(chunks, &mut |logged| all.extend(after_in(logged, points, after).cloned()));

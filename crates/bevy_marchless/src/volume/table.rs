@@ -201,7 +201,8 @@ impl ChunkTable {
         self.change(key, |_| {});
     }
 
-    /// Notes that a chunk has nothing to draw. Returns whether nothing of it is on the screen; if something is, nothing changes.
+    /// Notes that a chunk has nothing to draw. Returns whether nothing of it is on the screen; if something is, nothing
+    /// changes.
     pub(super) fn set_empty(&mut self, key: ChunkKey) -> bool {
         let mut is_empty = false;
         self.change(key, |entry| {

@@ -165,8 +165,8 @@ impl TileGrid {
     }
 
     /// The case index of each of the cells whose first corner lies in this tile, `[8·8·8]`, x fastest: bit k is
-    /// [`Corner`](crate::cell::Corner) k, which may lie in one of the tiles behind it. Corners beyond the grid count as zero.
-    /// `None` where there is no such tile.
+    /// [`Corner`](crate::cell::Corner) k, which may lie in one of the tiles behind it. Corners beyond the grid count as
+    /// zero. `None` where there is no such tile.
     pub fn case_masks(&self, position: [u32; 3]) -> Option<[u8; 512]> {
         self.tile(position)?;
         Some(dispatch(Backend::fastest(), OneTile(self.around(position))))

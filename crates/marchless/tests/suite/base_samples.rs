@@ -1,4 +1,5 @@
-//! A chunk's base samples are the same whichever way they are asked for, with bounds that are legal and as odd as can be.
+//! A chunk's base samples are the same whichever way they are asked for, with bounds that are legal and as odd as can
+//! be.
 
 use marchless::{BOUND_BOX_CHUNKS, Bound, Grid, GridChunk, Region, Source, SourceRegion};
 use proptest::prelude::*;

@@ -229,7 +229,8 @@ proptest! {
         check_placement(noise, true, function)?;
     }
 
-    /// What samples of the function give, but for where the vertices lie on their edges; on a plane, in the same places.
+    /// What samples of the function give, but for where the vertices lie on their edges; on a plane, in the same
+    /// places.
     #[test]
     fn placed_meshes_lie_on_spheres_and_planes(
         center in proptest::array::uniform3(4.0f32..9.0),

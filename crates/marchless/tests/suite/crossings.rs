@@ -1,5 +1,5 @@
-//! Crossing triangles against a plain oracle: all pairs, in whole numbers, by cutting each side of a triangle to what the
-//! other triangle leaves of it.
+//! Crossing triangles against a plain oracle: all pairs, in whole numbers, by cutting each side of a triangle to what
+//! the other triangle leaves of it.
 
 use marchless::MeshReport;
 use proptest::{collection::vec, prelude::*};

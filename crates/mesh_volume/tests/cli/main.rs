@@ -1,5 +1,5 @@
-//! The program on the command line: every type of sample in every format is the mesh of the whole volume, and the surface
-//! lies between the same samples as in the file's own numbers.
+//! The program on the command line: every type of sample in every format is the mesh of the whole volume, and the
+//! surface lies between the same samples as in the file's own numbers.
 
 mod check;
 mod chunks;

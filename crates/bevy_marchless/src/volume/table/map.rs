@@ -21,8 +21,8 @@ pub(super) struct Marks {
 
 /// The entries by chunk, in blocks of 4 × 4 × 4.
 ///
-/// Chunks lie close together, so there are few blocks to search, and a few words tell the state of all chunks around one.
-/// Growing copies pointers to blocks, not entries.
+/// Chunks lie close together, so there are few blocks to search, and a few words tell the state of all chunks around
+/// one. Growing copies pointers to blocks, not entries.
 #[derive(Default)]
 pub(super) struct ChunkMap {
     /// The blocks by their positions. No block is empty.

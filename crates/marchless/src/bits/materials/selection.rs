@@ -1,4 +1,5 @@
-//! Which points have one of a set of materials: a decision diagram over the planes, evaluated a block of words at a time.
+//! Which points have one of a set of materials: a decision diagram over the planes, evaluated a block of words at a
+//! time.
 
 use alloc::{vec, vec::Vec};
 

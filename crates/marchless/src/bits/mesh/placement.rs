@@ -1,12 +1,12 @@
 //! Moves vertices from the middle of their edges to where a function is zero.
 //!
-//! Zeros are found as by Tirupathi R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding the zero of a
-//! nonlinear function without using derivatives" (1997), but from the zero of the secant on, not from the middle.
+//! Zeros are found as by Tirupathi R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding the zero of
+//! a nonlinear function without using derivatives" (1997), but from the zero of the secant on, not from the middle.
 //!
-//! Refused, after trials with six evaluations between the ends on distances of spheres, sums of waves, kinks, powers and
-//! exponentials: regula falsi with the Illinois step or that of Anderson and Björck (the worst off by a third of an edge
-//! and more; here by an eighth), ITP and Ridders' method (always take all six; here, spheres of 5 to 25 cells take 2.5,
-//! and the worst in a hundred of spheres and waves come out closer).
+//! Refused, after trials with six evaluations between the ends on distances of spheres, sums of waves, kinks, powers
+//! and exponentials: regula falsi with the Illinois step or that of Anderson and Björck (the worst off by a third of an
+//! edge and more; here by an eighth), ITP and Ridders' method (always take all six; here, spheres of 5 to 25 cells take
+//! 2.5, and the worst in a hundred of spheres and waves come out closer).
 
 use core::mem;
 
@@ -61,8 +61,8 @@ impl CrossedEdge {
         position
     }
 
-    /// How far along the edge the function is zero, clamped; `None` where its signs at the ends are not the bits', or one
-    /// of its values is not finite.
+    /// How far along the edge the function is zero, clamped; `None` where its signs at the ends are not the bits', or
+    /// one of its values is not finite.
     fn zero_of(&self, distance: &dyn Fn([f32; 3]) -> f32) -> Option<f32> {
         let value_at = |fraction: f64| {
             let value = distance(self.at_fraction(fraction as f32));
@@ -93,8 +93,8 @@ impl CrossedEdge {
     }
 }
 
-/// Which part of the way from the newest point to the other end of the bracket to go next: by the parabola through three
-/// points, each with its value, where its values tell their places apart all the way; otherwise, one half.
+/// Which part of the way from the newest point to the other end of the bracket to go next: by the parabola through
+/// three points, each with its value, where its values tell their places apart all the way; otherwise, one half.
 fn next_step(newest: (f64, f64), other: (f64, f64), older: (f64, f64)) -> f64 {
     let ((a, at_a), (b, at_b), (c, at_c)) = (newest, other, older);
     let (place, value) = ((a - b) / (c - b), (at_a - at_b) / (at_c - at_b));

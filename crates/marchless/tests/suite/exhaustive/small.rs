@@ -1,8 +1,8 @@
 //! A judge of tiny meshes that takes about a microsecond: all that it keeps is a few words per vertex.
 //!
 //! It asks for more than [`MeshReport`](marchless::MeshReport) does, since it knows the samples: a vertex on each
-//! crossing and nowhere else (but strictly inside cells, where that is allowed), a rim in the faces of the box only, and
-//! no inner side of two triangles in a face of the box, where a neighbour's could meet it.
+//! crossing and nowhere else (but strictly inside cells, where that is allowed), a rim in the faces of the box only,
+//! and no inner side of two triangles in a face of the box, where a neighbour's could meet it.
 
 use marchless::MeshBuffer;
 

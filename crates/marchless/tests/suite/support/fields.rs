@@ -15,8 +15,8 @@ pub(crate) struct Field<W> {
 }
 
 impl<W: TestWeight> Field<W> {
-    /// Any field: white noise of a few or of all weights, sparse or dense; layers of slabs that are all inside or outside
-    /// but for a sample or so.
+    /// Any field: white noise of a few or of all weights, sparse or dense; layers of slabs that are all inside or
+    /// outside but for a sample or so.
     pub(crate) fn any() -> impl Strategy<Value = Self> {
         (sizes(), any::<bool>(), 0..5usize).prop_flat_map(|(size, padded, kind)| {
             let shape = Shape::new(size.map(|n| n + 2 * u32::from(padded))).expect("the sizes are small");
