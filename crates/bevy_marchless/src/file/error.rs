@@ -13,10 +13,10 @@ use crate::terrain::TerrainError;
 #[non_exhaustive]
 pub enum DescriptionError {
     /// The file's bytes could not be read.
-    #[error("the world file cannot be read: {0}")]
+    #[error("the terrain file cannot be read: {0}")]
     Read(#[from] io::Error),
     /// The text ends before the description does.
-    #[error("the world file is cut short: it ends in line {line}, column {column}, in the middle of the world")]
+    #[error("the terrain file is cut short: it ends in line {line}, column {column}, in the middle of the description")]
     CutShort {
         /// The last line.
         line: usize,
@@ -24,7 +24,7 @@ pub enum DescriptionError {
         column: usize,
     },
     /// The file is not UTF-8 text.
-    #[error("a world file must be UTF-8 text, but there are other bytes in line {line}")]
+    #[error("a terrain file must be UTF-8 text, but there are other bytes in line {line}")]
     NotText {
         /// The line of the first byte that is not UTF-8.
         line: usize,
@@ -70,7 +70,7 @@ pub enum DescriptionError {
         picture: String,
     },
     /// The description cannot be written.
-    #[error("the world cannot be written: {message}")]
+    #[error("the description cannot be written: {message}")]
     Write {
         /// The reason.
         message: String,
@@ -107,7 +107,7 @@ impl DescriptionError {
         };
         match error.code {
             RonError::Eof | RonError::ExpectedStringEnd | RonError::UnclosedBlockComment => Self::cut_short(text),
-            RonError::TrailingCharacters => text_error("there is text after the world's end".into()),
+            RonError::TrailingCharacters => text_error("there is text after the end of the description".into()),
             _ if at_end || in_last_word => Self::cut_short(text),
             code => text_error(code.to_string()),
         }

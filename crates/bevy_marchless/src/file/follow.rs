@@ -55,7 +55,7 @@ pub(super) fn follow_files(
                 *terrain = next;
                 followed.description = Some(description.clone());
             }
-            Err(error) => bevy_log::warn!("terrain {entity}: its world is not applied, and it stays as it is: {error}"),
+            Err(error) => bevy_log::warn!("terrain {entity}: its file is not applied, and it stays as it is: {error}"),
         }
     }
 }
@@ -106,8 +106,8 @@ fn describe(error: &AssetLoadError) -> String {
     if let AssetLoadError::AssetLoaderError(loading) = error
         && let Some(error) = loading.error().downcast_ref::<DescriptionError>()
     {
-        return format!("world '{}' cannot be loaded: {error}", loading.path());
+        return format!("terrain file '{}' cannot be loaded: {error}", loading.path());
     }
     let text = error.to_string();
-    format!("world cannot be loaded: {}", text.lines().next().unwrap_or(""))
+    format!("terrain file cannot be loaded: {}", text.lines().next().unwrap_or(""))
 }

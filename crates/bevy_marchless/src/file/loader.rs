@@ -33,7 +33,7 @@ impl AssetLoader for DescriptionLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &["world.ron"]
+        &["terrain.ron"]
     }
 }
 

@@ -370,7 +370,17 @@ fn the_plugin_does_nothing_without_assets_and_may_come_before_them() {
 }
 
 #[test]
-fn stamps_wait_for_a_world_that_is_being_read() {
+fn the_name_alone_tells_that_a_file_describes_a_terrain() {
+    let mut game = Game::new();
+    game.write("named.terrain.ron", ball_text(12.0, ""));
+    let handle = game.server().load_builder().load_untyped("named.terrain.ron");
+    update_until(&mut game.app, |app| app.world().resource::<AssetServer>().is_loaded(&handle));
+    let descriptions = game.app.world().resource::<Assets<TerrainDescription>>();
+    assert_eq!(descriptions.len(), 1);
+}
+
+#[test]
+fn stamps_wait_for_a_file_that_is_being_read() {
     let world = TerrainDescription::new(SourceDescription::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
     let world = TerrainDescription { extent: UVec3::splat(2).into(), ..world };
     let mut game = Game::new();
