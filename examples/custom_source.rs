@@ -1,4 +1,4 @@
-//! A source of one's own: an endless staircase of terraces with a shaft through it, and a bound that spares the chunks
+//! A custom source: an endless staircase of terraces with a shaft through it, and a bound that spares the chunks
 //! above from being sampled.
 //!
 //! Click to grab the mouse; W, A, S, D, Space and Shift fly, Esc frees it. `--screenshot FILE.png` renders a picture

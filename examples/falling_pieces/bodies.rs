@@ -1,4 +1,4 @@
-//! [`Body`]: a island of the terrain that hangs free becomes one, falls and comes to rest. No physics engine: bits collide.
+//! [`Body`]: an island that hung free. It falls and comes to rest, without a physics engine: bits collide.
 
 use bevy::prelude::*;
 use bevy_marchless::bits::prelude::*;

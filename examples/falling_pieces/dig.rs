@@ -1,4 +1,4 @@
-//! Digging where one looks, and building everything anew.
+//! Digging at the middle of the screen, and building everything anew.
 
 use bevy::input::common_conditions::{input_just_pressed, input_pressed};
 use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! [`run`]: the stem is cut without any renderer, and what falls is watched until it rests.
+//! [`run`]: cuts the stem without a renderer, and watches the falling part until it rests.
 
 use core::time::Duration;
 use std::process::ExitCode;

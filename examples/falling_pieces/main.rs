@@ -1,4 +1,4 @@
-//! Dig through a pillar: what hangs free falls, as a body of its own, and comes to rest where it meets ground.
+//! Dig through a pillar: a part that hangs free falls as a body of its own, until it meets the ground.
 //!
 //! Click to grab the mouse, Esc frees it. W, A, S, D, Space and Shift fly, Ctrl flies faster; the left button digs, R
 //! builds everything anew. Cut the mushroom's stem, or both legs of the gate. The text says how large each island is.

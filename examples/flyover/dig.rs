@@ -1,4 +1,4 @@
-//! Digging where one looks.
+//! Digging at the middle of the screen.
 
 use bevy::input::common_conditions::input_just_pressed;
 use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! [`HillPicturePlugin`]: what one sees from a hill, before and after a hole was dug, and after a journey.
+//! [`HillPicturePlugin`]: the view from a hill, before and after a hole was dug, and after a journey.
 
 use bevy::prelude::*;
 use bevy_marchless::prelude::*;

@@ -1,4 +1,4 @@
-//! [`World`]: hills without end, and how far one sees.
+//! [`World`]: endless hills, and the viewing distance.
 
 use core::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! [`run`]: plays without any renderer, and checks what comes of it.
+//! [`run`]: plays without a renderer, and checks the results.
 
 use core::any::TypeId;
 use core::time::Duration;

@@ -1,4 +1,4 @@
-//! Bevy's own ray casts find chunks, too: they read the meshes, which the plugin keeps for them if it is asked to.
+//! Bevy's own ray casts find chunks, too: they read the meshes, which the plugin keeps for them if told to.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::input::common_conditions::input_just_pressed;

@@ -1,4 +1,4 @@
-//! The text: where one is, and the keys.
+//! The text: the position and the keys.
 
 use bevy::prelude::*;
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};

@@ -1,4 +1,4 @@
-//! [`Args`]: what the command line may say.
+//! [`Args`]: the command line's arguments.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! [`Brush`]: digs, adds and paints where one looks.
+//! [`Brush`]: digs, adds and paints at the middle of the screen.
 
 use core::time::Duration;
 

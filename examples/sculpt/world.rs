@@ -1,4 +1,4 @@
-//! [`World`]: what the terrain is made of, and the terrain that follows it.
+//! [`World`]: the settings of the terrain, and the terrain that follows them.
 
 use std::error::Error;
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};

@@ -1,4 +1,4 @@
-//! [`FlyCamera`]: a camera that flies where one looks.
+//! [`FlyCamera`]: a camera that flies in the direction of the view.
 //!
 //! A click grabs the mouse, Esc frees it. While it is grabbed the mouse turns the camera; W, A, S and D fly, Space
 //! rises, Shift sinks, and Ctrl flies faster.

@@ -226,8 +226,8 @@ fn questions_without_an_answer_say_why() {
         assert_eq!(ask(&mut app, move |bits| bits.bits(terrain, region)), Err(TerrainBitsError::Empty { region }));
         assert_eq!(ask(&mut app, move |bits| bits.islands(terrain, region)), Ok(vec![]));
         let ends = [IVec3::splat(3), IVec3::splat(4)];
-        for medium in [Phase::Solid, Phase::Air] {
-            let connected = ask(&mut app, move |bits| bits.connected(terrain, ends[0], ends[1], region, medium));
+        for phase in [Phase::Solid, Phase::Air] {
+            let connected = ask(&mut app, move |bits| bits.connected(terrain, ends[0], ends[1], region, phase));
             assert_eq!(connected, Ok(false));
         }
     }
@@ -245,8 +245,8 @@ fn what_is_connected_depends_on_the_box_and_on_edits() {
     let terrain = settled(&mut app, ground());
     let whole = Region::new([-1; 3], [34; 3]);
     let [left, right] = [IVec3::new(4, 8, 16), IVec3::new(28, 8, 16)];
-    let connected = |app: &mut App, a: IVec3, b: IVec3, region: Region, medium: Phase| {
-        ask(app, move |bits| bits.connected(terrain, a, b, region, medium)).expect("a small box")
+    let connected = |app: &mut App, a: IVec3, b: IVec3, region: Region, phase: Phase| {
+        ask(app, move |bits| bits.connected(terrain, a, b, region, phase)).expect("a small box")
     };
     assert!(connected(&mut app, left, right, whole, Solid));
     assert!(!connected(&mut app, left, right, whole, Air), "they are not in the air");

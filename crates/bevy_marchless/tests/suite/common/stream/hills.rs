@@ -12,7 +12,7 @@ pub struct Hills {
 }
 
 /// The edge of the cubes that may hold a cave each. [Units: world]
-const ROOM: f64 = 24.0;
+const BOUND_MARGIN: f64 = 24.0;
 const CAVE: f64 = 7.0;
 /// The height below which the ground is of material 2; above, it is of material 1.
 const ROCK: f64 = -30.0;
@@ -29,7 +29,7 @@ impl Hills {
     }
 
     fn distance([x, y, z]: [f64; 3]) -> f64 {
-        let room = [x, y, z].map(|v| (v / ROOM).floor());
+        let room = [x, y, z].map(|v| (v / BOUND_MARGIN).floor());
         let cave = if has_cave(room) { CAVE - length(sub([x, y, z], middle(room))) } else { -5.0 };
         (y - Self::height(x, z)).max(cave.max(-5.0))
     }
@@ -39,7 +39,7 @@ impl Hills {
         if low[1] > hills[1] {
             return Bound::Outside;
         }
-        let rooms = [0, 1, 2].map(|axis| [low[axis], high[axis]].map(|v| (v / ROOM).floor()));
+        let rooms = [0, 1, 2].map(|axis| [low[axis], high[axis]].map(|v| (v / BOUND_MARGIN).floor()));
         let few = rooms.iter().all(|[first, last]| last - first < 10.0);
         if high[1] < hills[0] && (high[1] < ROCK || low[1] >= ROCK) && few {
             let steps = |[first, last]: [f64; 2]| (0..=(last - first) as i32).map(move |step| first + f64::from(step));
@@ -100,7 +100,7 @@ fn material(y: f64) -> u8 {
 }
 
 fn middle(room: [f64; 3]) -> [f64; 3] {
-    room.map(|v| (v + 0.5) * ROOM)
+    room.map(|v| (v + 0.5) * BOUND_MARGIN)
 }
 
 /// One cube in four holds a cave, if it lies below the hills.
