@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_marchless::bits::prelude::*;
 use bevy_marchless::prelude::*;
 
-/// A island that has left the terrain. It falls by whole steps of the lattice as far as collisions go, and smoothly as
+/// An island that has left the terrain. It falls by whole steps of the lattice as far as collisions go, and smoothly as
 /// far as one sees.
 #[derive(Component)]
 pub(crate) struct Body {
