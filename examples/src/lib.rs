@@ -1,5 +1,5 @@
-//! Code that the examples share: a camera to fly with, a look (sky, light, fog, colours), pictures without a window, and
-//! the way to run without a screen.
+//! Code that the examples share: a camera to fly with, a look (sky, light, fog, colours), pictures without a window,
+//! and the way to run without a screen.
 
 pub mod camera;
 pub mod files;

@@ -55,7 +55,7 @@
 //!
 //! Off by default: `big_space` puts chunks into the cells of a `big_space` grid, for worlds of any size. `serde` makes
 //! settings serialisable. `terrain_files` includes `serde`; with it, terrains follow files in `assets`, even while the
-//! game runs (module `world`).
+//! game runs (module `file`).
 
 #[cfg(feature = "big_space")]
 pub mod big_space;
