@@ -173,7 +173,7 @@ pub enum BrushOperation {
 pub struct Stroke {
     /// A number of your choice for the stroke; it has no effect on the samples.
     pub id: u64,
-    /// The speed of the surface inside of the falloff, in voxels per second; at most 65,536.
+    /// The speed of the surface outside the falloff rim, in voxels per second; at most 65,536.
     pub rate: f32,
     /// The width of the rim within the shape over which the rate falls to 0, in voxels; at most 1,024.
     pub falloff: f32,

@@ -33,7 +33,7 @@ pub struct Leaf {
 pub enum LeafState {
     /// Not filled or not meshed yet.
     Waiting,
-    /// Known to have no surface.
+    /// Nothing is drawn: there is no surface, or the game has despawned the chunk's entity.
     Empty,
     /// Its mesh.
     Drawn,

@@ -79,9 +79,10 @@ pub struct MarchlessSettings {
     /// New meshes are shown until an update has shown this many bytes, so that uploads do not flood the graphics card;
     /// the last chunk may exceed the limit. Edits are shown at once, whatever their size. Default 4 MiB.
     pub max_upload_bytes: usize,
-    /// The time per update in which the main thread may load and unload chunks; the rest of the work waits. Each update
-    /// does some of it. Edits are not part of this budget and take the time they need; streaming holds back for them in
-    /// at most one of five updates. Default: 0.6 milliseconds.
+    /// The time per update that streaming may take on the main thread: loading and unloading chunks, taking in samples,
+    /// starting and showing first meshes. The rest of that work waits; each update does some of it. Edits are not part of
+    /// this budget and take the time they need; streaming holds back for them in at most one of five updates. Default:
+    /// 0.6 milliseconds.
     pub streaming_budget: Duration,
     /// The worlds that keep the [`Mesh`](bevy_mesh::Mesh) assets of chunks; applies to meshes made after a change.
     /// Default: `RENDER_WORLD` alone, which frees the main world's copy after its upload. With `MAIN_WORLD` too, mesh

@@ -268,13 +268,13 @@ pub enum TerrainError {
     /// The number of cells per axis is out of range.
     #[error("a chunk must have 8 to 62 cells per axis, but `chunk_cells` is {found}")]
     ChunkCells {
-        /// What was given.
+        /// The rejected number.
         found: u32,
     },
     /// The voxel size is not finite or not above 0.
     #[error("a terrain's voxel size must be finite and above 0, but it is {found}")]
     VoxelSize {
-        /// What was given, in world units.
+        /// The rejected size, in world units.
         found: f32,
     },
     /// The game has registered no source of this name.
@@ -286,7 +286,7 @@ pub enum TerrainError {
     /// The isovalue is NaN or infinite.
     #[error("a terrain's isovalue must be finite, but it is {found}")]
     Isovalue {
-        /// What was given, in voxels.
+        /// The rejected isovalue, in voxels.
         found: f32,
     },
 }

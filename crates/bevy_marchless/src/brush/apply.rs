@@ -78,7 +78,7 @@ pub(super) fn apply_stamps(
         let waits = waiting.entry(terrain).or_default();
         let (request, isovalue) = *queued.request.get_or_insert((volume.requests(), isovalue));
         if request != volume.requests() {
-            return false; // With the source that it was for, all that was dug is gone.
+            return false; // The stamp was for an earlier source, whose edits are discarded.
         }
         *waits = *waits || volume.has_next() || !volume.heart_mut().has_samples_for(queued.stamp.region());
         if !*waits {

@@ -1,14 +1,14 @@
-//! [`Extent`] and [`Keep`]: which chunks a terrain has, and which of them are loaded whoever looks.
+//! [`Extent`]: the chunks that a terrain has. [`Keep`]: those that are loaded even without a viewer.
 
 use bevy_math::{IVec3, UVec3};
 use bevy_reflect::prelude::*;
 use core::ops::Range;
 use marchless::Region;
 
-/// Which chunks a terrain has: positions from `min` up to, but without, `max`, in chunks.
+/// The chunks that a terrain has: positions from `min` up to, but excluding, `max`, in chunks.
 ///
-/// Outside of it there is air. What lies beyond the farthest lattice points that there can be, some two thousand
-/// million voxels from the origin, is left out: an axis that reaches so far is endless for all that a player can tell.
+/// Outside the extent there is air. Chunks beyond the farthest addressable lattice points, about two thousand million
+/// voxels from the origin, are left out; for a player, an axis that long is endless.
 ///
 /// ```
 /// use bevy_marchless::prelude::*;
@@ -28,63 +28,63 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Without any border.
+    /// An extent without borders.
     pub const ENDLESS: Self = Self { min: IVec3::MIN, max: IVec3::MAX };
 
-    /// From `min` up to, but without, `max`, in chunks.
+    /// Creates the extent from `min` up to, but excluding, `max`, in chunks.
     pub const fn new(min: IVec3, max: IVec3) -> Self {
         Self { min, max }
     }
 
-    /// The same extent with these chunks along x.
+    /// Sets the chunks along x.
     #[must_use]
     pub const fn with_x(mut self, chunks: Range<i32>) -> Self {
         (self.min.x, self.max.x) = (chunks.start, chunks.end);
         self
     }
 
-    /// The same extent with these chunks along y.
+    /// Sets the chunks along y.
     #[must_use]
     pub const fn with_y(mut self, chunks: Range<i32>) -> Self {
         (self.min.y, self.max.y) = (chunks.start, chunks.end);
         self
     }
 
-    /// The same extent with these chunks along z.
+    /// Sets the chunks along z.
     #[must_use]
     pub const fn with_z(mut self, chunks: Range<i32>) -> Self {
         (self.min.z, self.max.z) = (chunks.start, chunks.end);
         self
     }
 
-    /// How large it is, in chunks per axis; 0 where `max` is not above `min`.
+    /// The extent's size in chunks per axis; 0 where `max` is not above `min`.
     pub fn size(&self) -> UVec3 {
         let size = |axis: usize| i64::from(self.max[axis]) - i64::from(self.min[axis]);
         UVec3::from([0, 1, 2].map(|axis| size(axis).clamp(0, u32::MAX.into()) as u32))
     }
 
-    /// What of it there can be with chunks of so many cells.
+    /// The part of the extent that can be addressed with chunks of `chunk_cells` cells.
     pub(crate) fn region(&self, chunk_cells: u32) -> Region {
         Region::new(self.min.to_array(), self.max.to_array())
             .intersection(&marchless::Grid::<i16>::largest(chunk_cells))
     }
 }
 
-/// Without any border.
+/// The default is an extent without borders.
 impl Default for Extent {
     fn default() -> Self {
         Self::ENDLESS
     }
 }
 
-/// From chunk 0 of each axis on, so many chunks.
+/// A size converts to an extent that starts at chunk 0 on each axis.
 impl From<UVec3> for Extent {
     fn from(size: UVec3) -> Self {
         Self { min: IVec3::ZERO, max: size.min(UVec3::splat(i32::MAX as u32)).as_ivec3() }
     }
 }
 
-/// An extent as files have it: the first chunk and one past the last, for the axes along which it ends.
+/// The serialised form of an extent: for each axis with an end, the first chunk and one past the last.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize, Default)]
 #[serde(rename = "Extent", default, deny_unknown_fields)]
@@ -113,22 +113,22 @@ impl From<Extent> for Ends {
     }
 }
 
-/// Which chunks of a terrain are loaded whether a [`TerrainViewer`](crate::stream::TerrainViewer) is near or not.
+/// The chunks of a terrain that are loaded even if no [`TerrainViewer`](crate::stream::TerrainViewer) is near.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, PartialEq, Hash, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Keep {
-    /// All of them; their number is limited by [`Terrain::MAX_CHUNKS`](super::Terrain::MAX_CHUNKS).
+    /// All chunks; [`Terrain::MAX_CHUNKS`](super::Terrain::MAX_CHUNKS) limits their number.
     #[default]
     Everything,
-    /// None.
+    /// No chunks.
     Nothing,
-    /// These, as far as the terrain has them.
+    /// These chunks, clipped to the terrain's extent.
     Chunks(Extent),
 }
 
 impl Keep {
-    /// What is kept of a terrain's chunks.
+    /// The part of `extent` that is kept loaded.
     pub(crate) fn region(&self, extent: Region, chunk_cells: u32) -> Region {
         match self {
             Self::Everything => extent,

@@ -1,4 +1,4 @@
-//! [`SourceHandle`]: what a terrain is made of, itself or by name, and [`TerrainSources`], the names.
+//! [`SourceHandle`]: a terrain's source, held directly or by name. [`TerrainSources`]: the registered names.
 
 use core::fmt;
 use std::sync::Arc;
@@ -13,31 +13,31 @@ use crate::source::Air;
 
 /// A shared [`Source`], or the name of one in [`TerrainSources`].
 ///
-/// With the feature `serde` it can be written and read, so that terrains are a part of scenes: [`Air`],
+/// With the feature `serde`, handles are serialisable, so that terrains can be part of scenes. [`Air`],
 /// [`NoiseHeights`](crate::source::NoiseHeights), [`NoiseDensity`](crate::source::NoiseDensity),
-/// [`Landscape`](crate::source::Landscape) and [`Sdf`](crate::source::Sdf) as their settings, others by name. What has
-/// neither settings nor a name, such as a closure, cannot be written.
+/// [`Landscape`](crate::source::Landscape) and [`Sdf`](crate::source::Sdf) are written as their settings, other sources
+/// by name. A source with neither settings nor a name, such as a closure, cannot be written.
 #[derive(Reflect, Clone)]
 #[reflect(opaque)]
 #[reflect(Default, Debug, PartialEq, Clone)]
 #[cfg_attr(feature = "serde", reflect(Serialize, Deserialize))]
 pub struct SourceHandle {
-    /// Air, until a name has been looked up.
+    /// The source; air until the name is resolved.
     source: Arc<dyn Source>,
     name: Option<Arc<str>>,
 }
 
 impl SourceHandle {
-    /// A handle to `source`.
+    /// Creates a handle to `source`.
     pub fn new(source: impl Source) -> Self {
         Self { source: Arc::new(source), name: None }
     }
 
-    /// The source that the game has registered in [`TerrainSources`] under a name, or will have by the time the terrain
-    /// is prepared.
+    /// Creates a handle to the source that [`TerrainSources`] holds under `name` when the terrain is prepared.
     ///
-    /// A terrain whose name nobody has registered is refused with [`TerrainError::Source`], and stays as it is, a new
-    /// one empty, until somebody has. Another source under the same name fills the terrain anew.
+    /// A terrain with an unregistered source name is refused with [`TerrainError::Source`] until the name is
+    /// registered. Meanwhile it stays as it is; a new one stays empty. Another source under the same name fills the
+    /// terrain anew.
     ///
     /// ```
     /// use bevy_marchless::prelude::*;
@@ -53,21 +53,21 @@ impl SourceHandle {
         Self { source: Arc::new(Air), name: Some(name.into()) }
     }
 
-    /// The source itself. Of a handle by name it is [`Air`]; the handle in
+    /// The source. A handle by name returns [`Air`]; the handle in
     /// [`TerrainVolume::settings`](super::TerrainVolume::settings) has the source of that name.
     pub const fn get(&self) -> &Arc<dyn Source> {
         &self.source
     }
 
-    /// The name that it goes by, if any.
+    /// The name of the source, if the handle has one.
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 
-    /// The handle with the source that it names.
+    /// Resolves the handle's name to its source.
     ///
     /// # Errors
-    /// [`TerrainError::Source`] where there is none of its name.
+    /// [`TerrainError::Source`] if no source has this name.
     pub(super) fn resolved(&self, sources: &TerrainSources) -> Result<Self, TerrainError> {
         let Some(name) = &self.name else { return Ok(self.clone()) };
         match sources.0.get(name) {
@@ -98,30 +98,31 @@ impl fmt::Debug for SourceHandle {
     }
 }
 
-/// Handles are equal where they share one source, or one name.
+/// Handles are equal if they share one source or one name.
 impl PartialEq for SourceHandle {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name && (self.name.is_some() || Arc::ptr_eq(&self.source, &other.source))
     }
 }
 
-/// The game's own sources by name, for [`SourceHandle::named`]: what scenes and files can refer to.
+/// The game's own sources by name, for [`SourceHandle::named`]; scenes and files can refer to them.
 #[derive(Resource, Default)]
 pub struct TerrainSources(HashMap<Arc<str>, Arc<dyn Source>>);
 
 impl TerrainSources {
-    /// Registers a source. Terrains that go by this name are filled with it, those there already anew.
+    /// Registers a source under a name. Terrains with this source name are filled with it; existing ones are filled
+    /// anew.
     pub fn insert(&mut self, name: impl Into<Arc<str>>, source: impl Source) {
         self.0.insert(name.into(), Arc::new(source));
     }
 
-    /// The source of a name.
+    /// The source registered under `name`.
     pub fn get(&self, name: &str) -> Option<&Arc<dyn Source>> {
         self.0.get(name)
     }
 }
 
-/// How handles are written and read.
+/// Serialisation of handles.
 #[cfg(feature = "serde")]
 mod written {
     use core::any::Any;
@@ -137,7 +138,7 @@ mod written {
         Landscape, LandscapeSettings, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings,
     };
 
-    /// A source as data.
+    /// The serialised form of a source.
     #[derive(Serialize, Deserialize)]
     #[serde(rename = "Source")]
     enum SerializedSource {
@@ -153,7 +154,7 @@ mod written {
     }
 
     impl SerializedSource {
-        /// `None` where the source is no data.
+        /// The serialised form of a handle; `None` if the source has none.
         fn of(handle: &SourceHandle) -> Option<Self> {
             if let Some(name) = handle.name() {
                 return Some(Self::Named(name.to_owned()));

@@ -1,4 +1,4 @@
-//! Gives new terrains a volume and chunks, and follows changes of their settings.
+//! Gives new terrains a volume and applies changes of settings.
 
 use bevy_ecs::entity_disabling::Disabled;
 use bevy_ecs::prelude::*;
@@ -13,10 +13,10 @@ use crate::chunk::{Chunk, ChunkKey, chunk_transform};
 use crate::schedule::MakesMeshes;
 use crate::volume::Heart;
 
-/// Checks terrains that are new or whose settings changed, and does what the change asks for.
+/// Checks new and changed terrains and applies their settings.
 ///
-/// When settings were changed is compared with when those looked at last were, so that no change is missed that was
-/// made while the terrain was disabled.
+/// Compares the change tick with that of the settings last checked, so that changes made while a terrain was disabled
+/// are not missed.
 pub(crate) fn prepare_terrains(
     mut terrains: Query<(Entity, Ref<Terrain>, &mut TerrainVolume, Has<TerrainError>)>,
     mut transforms: Query<&mut Transform, With<Chunk>>,
@@ -66,7 +66,7 @@ pub(crate) fn prepare_terrains(
     budget.spend(start);
 }
 
-/// Follows all settings that ask for no other samples.
+/// Applies all settings that do not change the samples.
 fn follow_settings(volume: &mut TerrainVolume) {
     let Some(settings) = volume.settings() else { return };
     let (isovalue, normals, colors) = (settings.isovalue, settings.normals, settings.palette.to_vertex_colors());
@@ -81,14 +81,14 @@ fn follow_settings(volume: &mut TerrainVolume) {
     heart.set_isovalue(isovalue);
 }
 
-/// Forgets all chunks; those in range come back by themselves.
+/// Replaces the whole heart and despawns all chunks; chunks in the load regions are loaded anew.
 fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, meshing: bool, commands: &mut Commands) {
     let colors = Arc::new(terrain.palette.to_vertex_colors());
     let former = volume.start_over(Heart::new(terrain.recipe(), terrain.isovalue, terrain.normals, colors, meshing));
     despawn_chunks(former, commands);
 }
 
-/// Moves what is drawn of a terrain whose voxels have another size.
+/// Moves a terrain's drawn chunks after its voxel size changed.
 fn place_chunks(terrain: &Terrain, heart: &Heart, transforms: &mut Query<&mut Transform, With<Chunk>>) {
     for (key, entity) in heart.table().entities() {
         if let Ok(mut transform) = transforms.get_mut(entity) {
@@ -97,13 +97,13 @@ fn place_chunks(terrain: &Terrain, heart: &Heart, transforms: &mut Query<&mut Tr
     }
 }
 
-/// Chunks that are not the plugin's own: copies, by cloning a terrain or by reading a scene, and what a game has put
-/// there.
+/// Chunk entities that the plugin did not create: copies made by cloning a terrain, chunks read from a scene, and those
+/// that a game spawned.
 #[derive(Resource, Default)]
 pub(crate) struct CopiedChunks(Vec<Entity>);
 
-/// Chunks are made, never copied: one that its terrain does not know of goes. Not at once, since somebody may be about
-/// to give it more components.
+/// Notes a chunk that its terrain does not know, to despawn it. It is not despawned at once, since the caller may be
+/// about to add more components to it.
 pub(crate) fn note_copied_chunk(
     added: On<Add, Chunk>,
     chunks: Query<&Chunk, Allow<Disabled>>,
@@ -118,7 +118,7 @@ pub(crate) fn note_copied_chunk(
     }
 }
 
-/// Despawns what has been noted, but for what is no chunk any more.
+/// Despawns the noted entities that are still chunks.
 pub(crate) fn despawn_copied_chunks(
     mut copied: ResMut<CopiedChunks>,
     chunks: Query<(), (With<Chunk>, Allow<Disabled>)>,
@@ -129,7 +129,8 @@ pub(crate) fn despawn_copied_chunks(
     }
 }
 
-/// A despawned chunk is drawn no more. Its samples stay: its neighbours' meshes need them.
+/// Removes a despawned chunk from the terrain's shown chunks. Its samples stay, because its neighbours' meshes need
+/// them.
 pub(crate) fn forget_despawned_chunk(
     removed: On<Remove, Chunk>,
     chunks: Query<&Chunk, Allow<Disabled>>,
@@ -141,7 +142,7 @@ pub(crate) fn forget_despawned_chunk(
     volume.heart_mut().despawned(key, removed.entity);
 }
 
-/// Without its `Terrain` an entity is no terrain: its chunks and samples go.
+/// Drops the chunks and samples of an entity whose `Terrain` was removed.
 pub(crate) fn forget_removed_terrain(
     removed: On<Remove, Terrain>,
     mut volumes: Query<&mut TerrainVolume, Allow<Disabled>>,

@@ -1,4 +1,4 @@
-//! [`TerrainVolume`]: where a terrain's samples live, and what is shown of them.
+//! [`TerrainVolume`]: a terrain's samples and the state of its chunks.
 
 use bevy_ecs::change_detection::Tick;
 use bevy_ecs::prelude::*;
@@ -11,8 +11,10 @@ use crate::chunk::ChunkKey;
 use crate::cover::{Coverage, Leaf};
 use crate::volume::Heart;
 
-/// A terrain's samples, and what is shown of them. The plugin fills and changes them; read them here, change them with
-/// [`Stamp`](crate::brush::Stamp) messages. It is neither cloned nor written with its terrain: that has its own.
+/// A terrain's samples, and the part of them that is shown.
+///
+/// The plugin fills and changes the samples. Read them here; change them with [`Stamp`](crate::brush::Stamp) messages.
+/// The volume is not cloned or written with its terrain: the copy gets its own.
 #[derive(Component, Reflect, Default)]
 #[reflect(Component, Default, from_reflect = false)]
 #[component(clone_behavior = Ignore)]
@@ -20,19 +22,19 @@ pub struct TerrainVolume {
     /// The settings in effect.
     #[reflect(ignore)]
     settings: Option<Terrain>,
-    /// Settings that ask for other samples, and wait until those in effect have been shown.
+    /// Settings that change the samples; pending until the generation under way is shown.
     #[reflect(ignore)]
     next: Option<Terrain>,
-    /// How often other samples have been asked for.
+    /// The number of times that settings changed the samples.
     #[reflect(ignore)]
     requests: u64,
-    /// How often the settings in effect have changed.
+    /// The number of times that the settings in effect changed.
     #[reflect(ignore)]
     changes: u64,
-    /// When the settings that were looked at last had been changed.
+    /// The change tick of the settings last checked.
     #[reflect(ignore)]
     seen: Option<Tick>,
-    /// When the sources that were looked at last had been changed.
+    /// The change tick of the named sources last checked.
     #[reflect(ignore)]
     sources: Option<Tick>,
     /// Whether a file with other settings is being read.
@@ -43,42 +45,42 @@ pub struct TerrainVolume {
 }
 
 impl TerrainVolume {
-    /// The newest samples, with every edit; perhaps not shown yet. Absent chunks are not filled, not loaded, or
+    /// The newest samples, with every edit; they may not be shown yet. Absent chunks are not filled, not loaded, or
     /// dropped.
     pub const fn grid(&self) -> &Grid<i16> {
         self.heart.samples().newest()
     }
 
-    /// The samples as they are drawn at the moment.
+    /// The samples of the meshes that are drawn now.
     pub const fn shown(&self) -> &Grid<i16> {
         self.heart.samples().shown()
     }
 
-    /// The isovalue as it is drawn at the moment, in voxels.
+    /// The isovalue of the meshes that are drawn now, in voxels.
     pub const fn shown_isovalue(&self) -> f32 {
         self.heart.isovalue()
     }
 
-    /// The settings in effect; `None` before the plugin has first seen the terrain, or where it refused its settings.
+    /// The settings in effect; `None` until the plugin has first seen the terrain, or if it refused its settings.
     ///
-    /// Settings that ask for other samples take effect once those before them have been shown.
+    /// Settings that change the samples take effect once the generation before them is shown.
     pub const fn settings(&self) -> Option<&Terrain> {
         self.settings.as_ref()
     }
 
-    /// The entity of the chunk at `position`, in chunks; `None` where there is nothing to draw.
+    /// The entity of the chunk at `position`, in chunks; `None` if there is nothing to draw.
     pub fn chunk_entity(&self, position: IVec3) -> Option<Entity> {
         self.heart.entity(ChunkKey::finest(position.to_array()))
     }
 
-    /// What is shown of the chunk at a place, in chunks; `None` where it is in no range.
+    /// The state of the chunk at `position`, in chunks; `None` outside all load regions.
     ///
-    /// All places in range together are the terrain's cover: each belongs to one leaf in every update.
+    /// All positions in the load regions form the terrain's cover: each belongs to one leaf in every update.
     pub fn leaf_at(&self, position: IVec3) -> Option<Leaf> {
         self.heart.leaf_at(position.to_array())
     }
 
-    /// How many leaves of each state there are. Takes the longer, the more chunks have just come into range.
+    /// The number of leaves in each state. The more chunks have just come into range, the longer this takes.
     pub fn coverage(&self) -> Coverage {
         self.heart.coverage()
     }
@@ -88,13 +90,12 @@ impl TerrainVolume {
         !self.is_loading && self.next.is_none() && self.heart.is_filled()
     }
 
-    /// Whether all chunks in range have their samples and everything is drawn as it is.
+    /// Whether all chunks in range have their samples and the newest state of everything is drawn.
     pub fn is_settled(&self) -> bool {
         !self.is_loading && self.next.is_none() && self.heart.is_settled()
     }
 
-    /// How much memory the samples take, in bytes: what is drawn, what is newest, and the plugin's notes about each
-    /// chunk.
+    /// The memory that samples take, in bytes: those drawn, the newest ones, and the bookkeeping of each chunk.
     pub fn sample_bytes(&self) -> usize {
         self.heart.sample_bytes_from([i32::MIN; 3], usize::MAX).0 + self.heart.notes_bytes()
     }
@@ -107,7 +108,7 @@ impl TerrainVolume {
         &mut self.heart
     }
 
-    /// Whether a file with other settings is being read: stamps are for those.
+    /// Whether a file with other settings is being read; stamps wait for those settings.
     pub(crate) const fn is_loading(&self) -> bool {
         self.is_loading
     }
@@ -117,32 +118,32 @@ impl TerrainVolume {
         self.is_loading = is_loading;
     }
 
-    /// How often other samples have been asked for: stamps of earlier ones are gone.
+    /// The number of times that settings changed the samples; stamps for earlier settings are discarded.
     pub(crate) const fn requests(&self) -> u64 {
         self.requests
     }
 
-    /// How often the settings in effect have changed.
+    /// The number of times that the settings in effect changed.
     pub(crate) const fn changes(&self) -> u64 {
         self.changes
     }
 
-    /// Whether settings wait that ask for other samples: stamps are for those.
+    /// Whether settings that change the samples are pending; stamps wait for them.
     pub(crate) const fn has_next(&self) -> bool {
         self.next.is_some()
     }
 
-    /// Whether the named sources that were changed then have not been looked at. From now on, they have.
+    /// Whether the named sources changed since the last call; notes their change tick.
     pub(super) fn has_other_sources(&mut self, changed: Tick) -> bool {
         self.sources.replace(changed) != Some(changed)
     }
 
-    /// Whether settings that were changed then have not been looked at.
+    /// Whether settings with this change tick are still unchecked.
     pub(super) fn is_new(&self, changed: Tick) -> bool {
         self.seen != Some(changed)
     }
 
-    /// Notes the settings that were changed then, which have been checked. Those that ask for other samples wait.
+    /// Accepts checked settings, with their change tick. Settings that change the samples become pending.
     pub(super) fn accept(&mut self, terrain: &Terrain, changed: Tick) {
         self.seen = Some(changed);
         self.changes += 1;
@@ -157,12 +158,13 @@ impl TerrainVolume {
         }
     }
 
-    /// Notes that settings that were changed then have been refused.
+    /// Notes that settings with this change tick were refused.
     pub(super) const fn refuse(&mut self, changed: Tick) {
         self.seen = Some(changed);
     }
 
-    /// Takes the settings that ask for other samples, once those before them have been shown, and those before them.
+    /// Puts the pending settings into effect once the current generation is shown. Returns them and the settings
+    /// before.
     pub(super) fn take_next(&mut self) -> Option<(Terrain, Option<Terrain>)> {
         if self.settings.is_some() && !self.heart.is_generation_shown() {
             return None;
@@ -173,7 +175,7 @@ impl TerrainVolume {
         Some((next, before))
     }
 
-    /// Replaces all that there is, but for the settings.
+    /// Replaces the heart and returns the old one; the settings stay.
     pub(super) fn start_over(&mut self, heart: Heart) -> Heart {
         core::mem::replace(&mut self.heart, heart)
     }
