@@ -80,9 +80,9 @@ pub struct MarchlessSettings {
     /// the last chunk may exceed the limit. Edits are shown at once, whatever their size. Default 4 MiB.
     pub max_upload_bytes: usize,
     /// The time per update that streaming may take on the main thread: loading and unloading chunks, taking in samples,
-    /// starting and showing first meshes. The rest of that work waits; each update does some of it. Edits are not part of
-    /// this budget and take the time they need; streaming holds back for them in at most one of five updates. Default:
-    /// 0.6 milliseconds.
+    /// starting and showing first meshes. The rest of that work waits; each update does some of it. Edits are not part
+    /// of this budget and take the time they need; streaming holds back for them in at most one of five updates.
+    /// Default: 0.6 milliseconds.
     pub streaming_budget: Duration,
     /// The worlds that keep the [`Mesh`](bevy_mesh::Mesh) assets of chunks; applies to meshes made after a change.
     /// Default: `RENDER_WORLD` alone, which frees the main world's copy after its upload. With `MAIN_WORLD` too, mesh
