@@ -43,8 +43,7 @@ fn settled_app(terrain: Terrain, viewer: Option<TerrainViewer>) -> (App, Entity)
 fn surface(app: &App, terrain: Entity, [x, z]: [f32; 2]) -> f32 {
     let grid = app.world().get::<TerrainVolume>(terrain).expect("a terrain has a volume").grid();
     let (origin, down) = ([f64::from(x) + 0.3, 1000.0, f64::from(z) + 0.2], [0.0, -1.0, 0.0]);
-    bevy_marchless::marchless::ray_cast(grid, 0.0, origin, down, 2000.0).expect("hills have a surface").position[1]
-        as f32
+    grid.ray_cast(0.0, origin, down, 2000.0).expect("hills have a surface").position[1] as f32
 }
 
 fn ray(criterion: &mut Criterion) {

@@ -8,7 +8,6 @@ use bevy_asset::AssetPlugin;
 use bevy_diagnostic::DiagnosticsPlugin;
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::SingleThreadedExecutor;
-use bevy_marchless::marchless::ray_cast;
 use bevy_marchless::prelude::*;
 use bevy_math::{DVec3, Vec3};
 use bevy_mesh::MeshPlugin;
@@ -126,7 +125,7 @@ impl Game {
     /// The surface at most 200 voxels below a place, in voxels; `None` where its samples are not there.
     pub fn ground_below(&self, place: Vec3) -> Option<DVec3> {
         let origin = place.as_dvec3().to_array();
-        ray_cast(self.volume().grid(), 0.0, origin, [0.0, -1.0, 0.0], 200.0).map(|hit| hit.position.into())
+        self.volume().grid().ray_cast(0.0, origin, [0.0, -1.0, 0.0], 200.0).map(|hit| hit.position.into())
     }
 }
 

@@ -140,7 +140,7 @@ impl TerrainQuery<'_, '_> {
         if Region::new(low, high.map(|v| v + 1)).points().any(unfilled) {
             return None;
         }
-        marchless::weight_at(volume.grid(), volume.settings()?.isovalue, lattice.to_array())
+        volume.grid().weight_at(volume.settings()?.isovalue, lattice.to_array())
     }
 
     /// Converts a position from world space to the terrain's lattice: voxels from its lowest corner, as stamps take it.
@@ -233,7 +233,7 @@ fn cast(
     loop {
         let from = origin + direction * start;
         let (shown, isovalue) = (volume.shown(), volume.shown_isovalue());
-        let hit = marchless::ray_cast(shown, isovalue, from.to_array(), direction.to_array(), reach - start)?;
+        let hit = shown.ray_cast(isovalue, from.to_array(), direction.to_array(), reach - start)?;
         let Some(chunk) = volume.heart().entity(ChunkKey::finest(hit.chunk)) else {
             // This chunk is not drawn yet; its samples serve its neighbours. Continue behind the hit.
             start += hit.distance + 1e-3;

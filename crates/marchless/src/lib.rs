@@ -126,7 +126,7 @@ pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
 pub use mesher::{MeshError, MeshSettings, Mesher, SlabMesher, Topology};
-pub use query::{RayHit, ray_cast, weight_at};
+pub use query::RayHit;
 pub use sample::{Voxel, Weight};
 pub use simd::Backend;
 pub use source::{Bound, Source, SourceRegion};

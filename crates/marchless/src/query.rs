@@ -36,47 +36,69 @@ pub struct RayHit {
     pub chunk: [i32; 3],
 }
 
-/// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no
-/// ray.
-///
-/// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue (in voxels). `origin`, `direction` and
-/// `max_distance` are in lattice units; the direction may have any length but 0, and the distance may be infinite. A
-/// ray along a triangle's plane or through its very edge may count as a hit or as a miss.
-///
-/// ```
-/// use marchless::{Grid, Operation, QuantisedShape, QuantisedStamp, ray_cast};
-///
-/// let mut grid = Grid::<i16>::new(32)?;
-/// grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 10.0)?, Operation::Add, 1));
-/// let hit = ray_cast(&grid, 0.0, [30.0, 0.5, 0.5], [-1.0, 0.0, 0.0], 100.0).expect("the ball is in its way");
-/// assert!((hit.distance - 20.0).abs() < 0.1);
-/// # Ok::<(), Box<dyn core::error::Error>>(())
-/// ```
-pub fn ray_cast<W: Weight>(
-    grid: &Grid<W>,
-    isovalue: f32,
-    origin: [f64; 3],
-    direction: [f64; 3],
-    max_distance: f64,
-) -> Option<RayHit> {
-    if !isovalue.is_finite() {
-        return None;
-    }
-    let ray = Ray::new(origin, direction, max_distance)?;
-    let limits = grid.limits();
-    let hit = |chunk: [i32; 3]| {
-        let surface = limits.contains(chunk).then(|| Surface::new(grid, chunk, isovalue))?;
-        if surface.is_empty() {
+impl<W: Weight> Grid<W> {
+    /// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no
+    /// ray.
+    ///
+    /// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue (in voxels). `origin`, `direction`
+    /// and `max_distance` are in lattice units; the direction may have any length but 0, and the distance may be
+    /// infinite. A ray along a triangle's plane or through its very edge may count as a hit or as a miss.
+    ///
+    /// ```
+    /// use marchless::{Grid, Operation, QuantisedShape, QuantisedStamp};
+    ///
+    /// let mut grid = Grid::<i16>::new(32)?;
+    /// grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 10.0)?, Operation::Add, 1));
+    /// let hit = grid.ray_cast(0.0, [30.0, 0.5, 0.5], [-1.0, 0.0, 0.0], 100.0).expect("the ball is in its way");
+    /// assert!((hit.distance - 20.0).abs() < 0.1);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn ray_cast(&self, isovalue: f32, origin: [f64; 3], direction: [f64; 3], max_distance: f64) -> Option<RayHit> {
+        if !isovalue.is_finite() {
             return None;
         }
-        ray.walk(grid.chunk_region(chunk), Cubes::of(1)).find_map(|cell| surface.hit(&ray, cell))
-    };
-    let chunks = Cubes::of(grid.chunk_cells().into());
-    let most = if is_shown_without_chunks(grid, isovalue) { MOST_WITHOUT_CHUNKS } else { NEAR };
-    if ray.steps(limits, chunks) <= most {
-        return ray.walk(limits, chunks).find_map(hit);
+        let ray = Ray::new(origin, direction, max_distance)?;
+        let limits = self.limits();
+        let hit = |chunk: [i32; 3]| {
+            let surface = limits.contains(chunk).then(|| Surface::new(self, chunk, isovalue))?;
+            if surface.is_empty() {
+                return None;
+            }
+            ray.walk(self.chunk_region(chunk), Cubes::of(1)).find_map(|cell| surface.hit(&ray, cell))
+        };
+        let chunks = Cubes::of(self.chunk_cells().into());
+        let most = if is_shown_without_chunks(self, isovalue) { MOST_WITHOUT_CHUNKS } else { NEAR };
+        if ray.steps(limits, chunks) <= most {
+            return ray.walk(limits, chunks).find_map(hit);
+        }
+        BoxWalk::new(self.occupancy(), &ray, self.chunk_cells()).find_map(hit)
     }
-    BoxWalk::new(grid.occupancy(), &ray, grid.chunk_cells()).find_map(hit)
+
+    /// The weight at a position minus the isovalue: its distance from the surface in voxels, negative inside.
+    /// `None` where the position or the isovalue is not finite.
+    ///
+    /// The weight is trilinear between the eight lattice points around the position, as meshes read them
+    /// ([`Grid::as_meshed`]); infinite and NaN samples count as the farthest finite ones of their side. `position`: in
+    /// lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles,
+    /// which the trilinear surface only comes close to.
+    pub fn weight_at(&self, isovalue: f32, position: [f64; 3]) -> Option<f32> {
+        if !position.iter().all(|v| v.is_finite()) || !isovalue.is_finite() {
+            return None;
+        }
+        let limits = (f64::from(i32::MIN), f64::from(i32::MAX - 1));
+        let position = position.map(|v| v.clamp(limits.0, limits.1));
+        let low = position.map(libm::floor);
+        let weight = Corner::ALL.iter().map(|corner| {
+            let offset = corner.offset();
+            let share = [0, 1, 2].map(|axis| {
+                let high = position[axis] - low[axis];
+                if offset[axis] == 1 { high } else { 1.0 - high }
+            });
+            let point = [0, 1, 2].map(|axis| low[axis] as i32 + i32::from(offset[axis]));
+            share[0] * share[1] * share[2] * self.as_meshed(point, isovalue).weight.finite() / f64::from(W::SCALE)
+        });
+        Some((weight.sum::<f64>() - f64::from(isovalue)) as f32)
+    }
 }
 
 /// A ray that passes at most this number of chunk positions visits them all, without the hierarchy of boxes.
@@ -88,32 +110,6 @@ const MOST_WITHOUT_CHUNKS: f64 = 65536.0;
 /// isovalues beyond the weights' range.
 fn is_shown_without_chunks<W: Weight>(grid: &Grid<W>, isovalue: f32) -> bool {
     grid.bounds().is_some() && W::OUTSIDE.inside(W::threshold(isovalue))
-}
-
-/// The weight at a position minus the isovalue: its distance from the surface in voxels, negative inside.
-/// `None` where the position or the isovalue is not finite.
-///
-/// The weight is trilinear between the eight lattice points around the position, as meshes read them
-/// ([`Grid::as_meshed`]); infinite and NaN samples count as the farthest finite ones of their side. `position`: in
-/// lattice units. The sign agrees with the mesh at lattice points; between them the mesh is made of triangles, which
-/// the trilinear surface only comes close to.
-pub fn weight_at<W: Weight>(grid: &Grid<W>, isovalue: f32, position: [f64; 3]) -> Option<f32> {
-    if !position.iter().all(|v| v.is_finite()) || !isovalue.is_finite() {
-        return None;
-    }
-    let limits = (f64::from(i32::MIN), f64::from(i32::MAX - 1));
-    let position = position.map(|v| v.clamp(limits.0, limits.1));
-    let low = position.map(libm::floor);
-    let weight = Corner::ALL.iter().map(|corner| {
-        let offset = corner.offset();
-        let share = [0, 1, 2].map(|axis| {
-            let high = position[axis] - low[axis];
-            if offset[axis] == 1 { high } else { 1.0 - high }
-        });
-        let point = [0, 1, 2].map(|axis| low[axis] as i32 + i32::from(offset[axis]));
-        share[0] * share[1] * share[2] * grid.as_meshed(point, isovalue).weight.finite() / f64::from(W::SCALE)
-    });
-    Some((weight.sum::<f64>() - f64::from(isovalue)) as f32)
 }
 
 /// The triangles of one chunk.

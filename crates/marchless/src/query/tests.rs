@@ -130,7 +130,7 @@ proptest! {
             if direction == [0.0; 3] {
                 continue;
             }
-            let found = ray_cast(&grid, isovalue, origin, direction, max_distance);
+            let found = grid.ray_cast(isovalue, origin, direction, max_distance);
             let strict = brute_force(&triangles, origin, direction, max_distance, 1e-7);
             let loose = brute_force(&triangles, origin, direction, max_distance, -1e-7);
             if strict.map(|hit| hit.0) != loose.map(|hit| hit.0) {
@@ -184,7 +184,7 @@ proptest! {
         max_distance in prop_oneof![any::<f64>(), Just(f64::INFINITY), Just(f64::NAN), Just(50.0)],
         isovalue in prop_oneof![any::<f32>(), Just(0.0)],
     ) {
-        if let Some(hit) = ray_cast(&grid(seed, bounded), isovalue, origin, direction, max_distance) {
+        if let Some(hit) = grid(seed, bounded).ray_cast(isovalue, origin, direction, max_distance) {
             prop_assert!((0.0..=max_distance).contains(&hit.distance), "{hit:?}");
             prop_assert!(hit.position.iter().all(|v| v.is_finite()), "{hit:?}");
             prop_assert!((dot(hit.normal.map(f64::from), hit.normal.map(f64::from)) - 1.0).abs() < 1e-5, "{hit:?}");
@@ -202,7 +202,7 @@ proptest! {
         }
         let exact = (0..3).map(|i| f64::from(slope[i]) * position[i]).sum::<f64>() / 256.0;
         for isovalue in [0.0, 1.5] {
-            let found = f64::from(weight_at(&grid, isovalue, position).unwrap() + isovalue);
+            let found = f64::from(grid.weight_at(isovalue, position).unwrap() + isovalue);
             prop_assert!((found - exact).abs() < 1e-5, "{found}, not {exact}");
         }
     }
@@ -214,8 +214,7 @@ fn rays_from_beyond_all_precision_come_to_an_end() {
     for far in [1e18, 1e40, 1e300] {
         let origin = [far, 0.5, 0.5];
         assert!(
-            ray_cast(&grid(1, false), 0.0, origin, [-1.0, 0.0, 0.0], f64::INFINITY)
-                .is_none_or(|hit| hit.distance > 0.0)
+            grid(1, false).ray_cast(0.0, origin, [-1.0, 0.0, 0.0], f64::INFINITY).is_none_or(|hit| hit.distance > 0.0)
         );
         let ray = Ray::new(origin, [-1.0, 0.0, 0.0], f64::INFINITY).unwrap();
         let region = Region::new([-100, 0, 0], [100, 1, 1]);
@@ -227,29 +226,29 @@ fn rays_from_beyond_all_precision_come_to_an_end() {
 fn both_sides_are_hit_and_the_normal_points_out() {
     let mut grid = Grid::<i16>::new(16).unwrap();
     grid.apply(&QuantisedStamp::new(QuantisedShape::sphere([0.0; 3], 6.0).unwrap(), Operation::Add, 4));
-    let outside = ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], f64::INFINITY).unwrap();
+    let outside = grid.ray_cast(0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], f64::INFINITY).unwrap();
     assert!((outside.distance - 84.0).abs() < 0.05 && outside.normal[2] > 0.9);
     assert_eq!((outside.material, outside.chunk), (4, [0, 0, 0]));
-    let inside = ray_cast(&grid, 0.0, [0.1, 0.2, 0.3], [0.0, 0.0, -1e-300], 20.0).unwrap();
+    let inside = grid.ray_cast(0.0, [0.1, 0.2, 0.3], [0.0, 0.0, -1e-300], 20.0).unwrap();
     assert!((inside.distance - 6.3).abs() < 0.05 && inside.normal[2] < -0.9);
     assert_eq!(inside.chunk, [0, 0, -1]);
-    assert_eq!(ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], 83.9), None);
-    assert_eq!(ray_cast(&grid, 0.0, [0.1, 0.2, 90.0], [0.0, 0.0, 2.0], f64::INFINITY), None);
+    assert_eq!(grid.ray_cast(0.0, [0.1, 0.2, 90.0], [0.0, 0.0, -2.0], 83.9), None);
+    assert_eq!(grid.ray_cast(0.0, [0.1, 0.2, 90.0], [0.0, 0.0, 2.0], f64::INFINITY), None);
 }
 
 #[test]
 fn what_is_no_ray_hits_nothing() {
     let grid = grid(1, true);
-    let cast = |origin, direction, length| ray_cast(&grid, 0.0, origin, direction, length);
+    let cast = |origin, direction, length| grid.ray_cast(0.0, origin, direction, length);
     assert!(cast([4.0, 4.0, 40.0], [0.0, 0.0, -1.0], 100.0).is_some());
     assert_eq!(cast([4.0, 4.0, 40.0], [0.0; 3], 100.0), None);
     assert_eq!(cast([4.0, f64::NAN, 40.0], [0.0, 0.0, -1.0], 100.0), None);
     assert_eq!(cast([4.0, 4.0, 40.0], [0.0, f64::INFINITY, -1.0], 100.0), None);
     assert_eq!(cast([4.0, 4.0, 40.0], [0.0, 0.0, -1.0], f64::NAN), None);
-    assert_eq!(ray_cast(&grid, f32::NAN, [4.0, 4.0, 40.0], [0.0, 0.0, -1.0], 100.0), None);
-    assert_eq!(ray_cast(&Grid::<i16>::new(8).unwrap(), 0.0, [0.0; 3], [1.0; 3], f64::INFINITY), None);
-    assert_eq!(weight_at(&grid, 0.0, [0.0, f64::INFINITY, 0.0]), None);
-    assert_eq!(weight_at(&grid, 0.0, [f64::MAX; 3]), Some(i16::OUTSIDE.to_voxels()));
+    assert_eq!(grid.ray_cast(f32::NAN, [4.0, 4.0, 40.0], [0.0, 0.0, -1.0], 100.0), None);
+    assert_eq!(Grid::<i16>::new(8).unwrap().ray_cast(0.0, [0.0; 3], [1.0; 3], f64::INFINITY), None);
+    assert_eq!(grid.weight_at(0.0, [0.0, f64::INFINITY, 0.0]), None);
+    assert_eq!(grid.weight_at(0.0, [f64::MAX; 3]), Some(i16::OUTSIDE.to_voxels()));
 }
 
 #[test]
@@ -263,7 +262,7 @@ fn chunks_far_apart_are_not_walked_between() {
     grid.apply(&ball([0, 0, 0], 1));
     grid.apply(&ball(far, 2));
     let [x, y, z] = far.map(|v| f64::from(v) * 8.0);
-    let cast = |origin, direction| ray_cast(&grid, 0.0, origin, direction, f64::INFINITY);
+    let cast = |origin, direction| grid.ray_cast(0.0, origin, direction, f64::INFINITY);
     let hit = cast([0.4, 0.3, 50.0], [0.0, 0.0, -1.0]).expect("the ball at the origin is in the way");
     assert_eq!((hit.material, hit.chunk), (1, [0, 0, 0]));
     let hit = cast([x + 0.4, y + 0.3, z - 50.0], [0.0, 0.0, 1.0]).expect("the far ball is in the way");
@@ -280,11 +279,11 @@ fn weights_are_finite_whatever_the_samples_are() {
     grid.set([0, 0, 0], Voxel::new(f32::NEG_INFINITY, 1)).unwrap();
     grid.set([1, 0, 0], Voxel::new(f32::NAN, 1)).unwrap();
     grid.set([0, 1, 0], Voxel::new(-2.0, 1)).unwrap();
-    assert_eq!(weight_at(&grid, 0.0, [0.0, 1.0, 0.0]), Some(-2.0));
+    assert_eq!(grid.weight_at(0.0, [0.0, 1.0, 0.0]), Some(-2.0));
     for position in [[0.0; 3], [0.5; 3], [1.0, 0.0, 0.0], [0.25, 0.0, 0.0]] {
-        assert!(weight_at(&grid, 0.0, position).is_some_and(f32::is_finite), "at {position:?}");
+        assert!(grid.weight_at(0.0, position).is_some_and(f32::is_finite), "at {position:?}");
     }
-    assert!(weight_at(&grid, 0.0, [0.0; 3]).is_some_and(|weight| weight < 0.0));
+    assert!(grid.weight_at(0.0, [0.0; 3]).is_some_and(|weight| weight < 0.0));
 }
 
 /// The nearest hit in all chunks that have a mesh, gone through one by one.
@@ -362,7 +361,7 @@ proptest! {
                 _ => core::array::from_fn(|axis| target[axis] - way[axis] * away),
             };
             let direction = minus(target, origin);
-            let found = ray_cast(&grid, isovalue, origin, direction, max_distance);
+            let found = grid.ray_cast(isovalue, origin, direction, max_distance);
             let expected = nearest_of_all(&grid, isovalue, origin, direction, max_distance);
             prop_assert_eq!(found.map(|hit| hit.distance), expected.map(|hit| hit.distance), "{:?}, {:?}", found, expected);
         }

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-/// What is told how much is done, from 0 to 1, and decides whether to go on.
+/// The callback that receives the share of the work done, from 0 to 1, and decides whether to go on.
 pub(super) type Progress<'a> = &'a mut dyn FnMut(f32) -> ControlFlow<()>;
 
 /// Runs jobs part by part, and keeps track of progress.
