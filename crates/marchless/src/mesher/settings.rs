@@ -20,8 +20,8 @@ pub struct MeshSettings {
 ///
 /// A cell is ambiguous if it has a face whose corners alternate, or if two corners at the ends of a diagonal differ
 /// from all others. Both topologies give closed, 2-manifold surfaces without zero-area triangles on every input, and
-/// the same vertices on the lattice's edges. A plugin's terrain, its ray casts ([`ray_cast`](crate::ray_cast)) and
-/// levels of detail use the default.
+/// the same vertices on the lattice's edges. A plugin's terrain, its ray casts
+/// ([`Grid::ray_cast`](crate::Grid::ray_cast)) and levels of detail use the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Topology {
     /// Separates inside corners that are diagonal to each other on a face or in a cell. This is the rule of the
