@@ -30,7 +30,7 @@ mod threads;
 mod trilinear;
 
 use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
-pub(crate) use crossing::{clamped, crossing_fraction};
+pub(crate) use crossing::{crossing_fraction, snapped};
 pub use error::MeshError;
 use error::checked_layout;
 use job::{Input, MeshJob};
@@ -44,7 +44,7 @@ pub use threads::ThreadedMesher;
 ///
 /// The surface is closed, 2-manifold, consistently oriented and free of zero-area triangles on every input, except
 /// where it leaves the meshed box. This holds up to 4,096 cells per axis; beyond, `f32` positions are too coarse for
-/// the clamp. Crossings stay at least 1/1024 of their edge away from its ends. NaN samples count as outside, infinite
+/// the clamp. Crossings stay at least 1/1024 of their edge away from its ends and lie at multiples of 2⁻¹⁴ of it. NaN samples count as outside, infinite
 /// ones by their sign; all positions and normals are finite on every input. The same samples give the same mesh, bit
 /// for bit.
 ///

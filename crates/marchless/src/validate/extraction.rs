@@ -12,12 +12,14 @@ use crate::{
 
 /// Crossings stay this far from the ends of their edge, in cells.
 const MARGIN: f64 = 1.0 / 1024.0;
+/// Half the distance between two places that a crossing is rounded to.
+const HALF_STEP: f64 = 0.5 / 16_384.0;
 
 /// Whether the vertices of a mesh lie on the crossings of the samples that it was made from.
 ///
 /// A crossing is an edge of the lattice with one end inside and the other one outside; its vertex lies where the
-/// weight, linear along the edge, is the isovalue, but at least 1/1024 of the edge from both ends. This report is about
-/// vertices alone; [`MeshReport`](crate::MeshReport) is about triangles.
+/// weight, linear along the edge, is the isovalue, rounded to a multiple of 2⁻¹⁴ of the edge and at least 1/1024 of it from
+/// both ends. This report is about vertices alone; [`MeshReport`](crate::MeshReport) is about triangles.
 ///
 /// ```
 /// use marchless::{ExtractionReport, MeshBuffer, MeshSettings, Mesher, Samples, Shape};
@@ -201,7 +203,7 @@ impl<'a, W: Weight> Lattice<'a, W> {
         let fraction = coordinate - low[axis] as f64;
         // Beyond 16,384 cells `f32` has no number within the margin.
         let clamped = (MARGIN..=1.0 - MARGIN).contains(&fraction) || coordinate >= 16_384.0;
-        clamped && (fraction - crossing).abs() <= 1e-6 + coordinate * f64::from(f32::EPSILON)
+        clamped && (fraction - crossing).abs() <= HALF_STEP + 1e-6 + coordinate * f64::from(f32::EPSILON)
     }
 
     /// Whether the cell above a sample has corners inside and outside.

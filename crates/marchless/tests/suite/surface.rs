@@ -116,7 +116,7 @@ proptest! {
         check_both(field)?;
     }
 
-    /// Whole steps, so that the samples are the plane's exactly.
+    /// Whole steps, so that the samples are the plane's exactly. Crossings are rounded to 2⁻¹⁴ of their edges.
     #[test]
     fn planes_are_exact(
         slope in proptest::array::uniform3(-200i16..=200),
@@ -146,7 +146,7 @@ proptest! {
             // Where it is not clamped.
             if (0.001..0.999).contains(&along) {
                 let distance = (dot(position, slope) + f32::from(offset)) / dot(slope, slope).sqrt();
-                prop_assert!(distance.abs() < 1e-5, "{:?} is {} off the plane", position, distance);
+                prop_assert!(distance.abs() < 0.5 / 16_384.0 + 1e-5, "{:?} is {} off the plane", position, distance);
             }
         }
     }

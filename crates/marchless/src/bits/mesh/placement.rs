@@ -10,7 +10,7 @@
 
 use core::mem;
 
-use crate::{bits::BitGrid, buffer::MeshBuffer, math::sqrt_f64, mesher::clamped};
+use crate::{bits::BitGrid, buffer::MeshBuffer, math::sqrt_f64, mesher::snapped};
 
 /// Evaluations a vertex, besides those at both ends of its edge.
 const STEPS: usize = 6;
@@ -61,7 +61,7 @@ impl CrossedEdge {
         position
     }
 
-    /// How far along the edge the function is zero, clamped; `None` where its signs at the ends are not the bits', or
+    /// How far along the edge the function is zero, snapped; `None` where its signs at the ends are not the bits', or
     /// one of its values is not finite.
     fn zero_of(&self, distance: &dyn Fn([f32; 3]) -> f32) -> Option<f32> {
         let value_at = |fraction: f64| {
@@ -89,7 +89,7 @@ impl CrossedEdge {
             (step, last) = (next_step(newest, other, older), fraction);
         }
         let fraction = newest.0 + (other.0 - newest.0) * (newest.1 / (newest.1 - other.1));
-        Some(clamped(fraction as f32))
+        Some(snapped(fraction as f32))
     }
 }
 

@@ -17,7 +17,7 @@ use core::mem::MaybeUninit;
 
 use super::mend::mend;
 use crate::mesher::{
-    crossing::{clamped, interpolated},
+    crossing::{interpolated, snapped},
     output::{VertexBounds, commit, reserve},
     settings::MeshSettings,
 };
@@ -261,7 +261,7 @@ impl<W: Weight> VertexPass<W> {
             let high_row = W::joined(high_left[i], high_right[i]);
             let (a, b) = (row[1], if AXIS == 0 { row[2] } else { high_row[1] });
             let (fraction, mut sound) = W::quick_fraction(a.wide(), b.wide(), isovalue);
-            let fraction = clamped(fraction);
+            let fraction = snapped(fraction);
             let mut position = [xs[i] as f32, ys[i] as f32, z];
             position[AXIS] += fraction;
             positions[i].write(position);
