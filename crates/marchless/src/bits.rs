@@ -42,8 +42,8 @@ pub use tile::{Tile, TileGrid};
 
 /// A grid of one bit for each lattice point.
 ///
-/// Bits are kept in rows of 64-bit words along x: bit `x % 64` of word `x / 64` of row `y + ny·z` is the point `[x, y,
-/// z]`. A row starts with a new word; the unused bits of its last word are zero.
+/// Bits are kept in rows of 64-bit words along x: the point `[x, y, z]` is bit `x % 64` of word `x / 64` of row
+/// `y + ny·z`. Each row starts with a new word; the unused bits of its last word are zero.
 ///
 /// Constructors return an error if memory cannot hold the grid. Operations that return another grid of the same shape
 /// abort if memory runs out, as vectors do. Their `…_into` forms write to an existing grid.
@@ -59,7 +59,7 @@ pub use tile::{Tile, TileGrid};
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct BitGrid {
     shape: Shape,
-    /// Words a row.
+    /// Words per row.
     row: usize,
     words: Words,
 }
@@ -73,7 +73,7 @@ impl BitGrid {
         Self::filled(shape, false)
     }
 
-    /// A grid of zeros, of the shape of another grid.
+    /// A grid of zeros with the shape of an existing grid. Aborts if memory runs out.
     pub(crate) fn empty(shape: Shape) -> Self {
         let [nx, ny, nz] = shape.size().map(|size| size as usize);
         let row = nx.div_ceil(64);
@@ -98,7 +98,7 @@ impl BitGrid {
         Ok(grid)
     }
 
-    /// A grid whose bits are the results of `is_set` for each point.
+    /// A grid whose bits are what `is_set` returns for each point.
     ///
     /// # Errors
     /// [`BitsError::TooLarge`] if memory cannot hold the grid.
@@ -114,12 +114,13 @@ impl BitGrid {
         Ok(grid)
     }
 
-    /// The grid of the samples that are inside: whose weight is below `isovalue`, which is in voxels and must be
-    /// finite. Of [padded](Samples::padded) samples, the padding is left out.
+    /// A grid with a bit for each sample, set where the sample is inside: where its weight is below `isovalue`.
+    ///
+    /// `isovalue` is in voxels and must be finite. The padding of [padded](Samples::padded) samples is left out.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold it, [`BitsError::OnlyPadding`] where padding is all there is,
-    /// [`BitsError::IsovalueNotFinite`].
+    /// [`BitsError::TooLarge`] if memory cannot hold the grid, [`BitsError::OnlyPadding`] if the samples are padding
+    /// only, [`BitsError::IsovalueNotFinite`].
     pub fn from_samples<W: Weight>(samples: Samples<'_, W>, isovalue: f32) -> Result<Self, BitsError> {
         if !isovalue.is_finite() {
             return Err(BitsError::IsovalueNotFinite { isovalue });
@@ -165,7 +166,7 @@ impl BitGrid {
         self.words.iter().all(|&word| word == 0)
     }
 
-    /// The points whose bit is set, in the order of memory: x fastest, z slowest.
+    /// The points whose bit is set, in memory order: x fastest, z slowest.
     pub fn iter(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let ny = self.shape.size()[1] as usize;
         self.words.iter().enumerate().flat_map(move |(index, &word)| {
@@ -180,7 +181,7 @@ impl BitGrid {
         &self.words
     }
 
-    /// Words a row.
+    /// The number of words per row.
     pub const fn words_per_row(&self) -> usize {
         self.row
     }
@@ -196,13 +197,13 @@ impl BitGrid {
         &mut self.words
     }
 
-    /// The bits of a row's last word that are points.
+    /// The mask of the used bits of a row's last word.
     pub(crate) const fn last_word(&self) -> u64 {
         let nx = self.shape.size()[0] as usize;
         u64::MAX >> (64 * self.row - nx)
     }
 
-    /// Clears the unused bits, which belong to no point.
+    /// Clears the unused bits of each row's last word.
     pub(crate) fn clear_unused(&mut self) {
         let last = self.last_word();
         if last != u64::MAX {
@@ -212,8 +213,10 @@ impl BitGrid {
         }
     }
 
+    /// Checks that `other` has the same shape.
+    ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`] where the other grid has another shape.
+    /// [`BitsError::ShapesDiffer`] if it has another shape.
     pub(crate) fn same_shape(&self, other: &Self) -> Result<(), BitsError> {
         if self.shape == other.shape {
             return Ok(());
@@ -221,7 +224,7 @@ impl BitGrid {
         Err(BitsError::ShapesDiffer { expected: self.shape, found: other.shape })
     }
 
-    /// A point's word and its bit there.
+    /// The index of a point's word and the bit in that word; `None` outside the grid.
     fn place_of(&self, [x, y, z]: [u32; 3]) -> Option<(usize, u32)> {
         let [nx, ny, nz] = self.shape.size();
         (x < nx && y < ny && z < nz).then(|| {
@@ -231,7 +234,7 @@ impl BitGrid {
     }
 }
 
-/// The indices of the set bits of a word, the lowest first.
+/// The indices of a word's set bits, lowest first.
 pub(crate) fn set_bits(mut word: u64) -> impl Iterator<Item = u32> {
     core::iter::from_fn(move || {
         let bit = (word != 0).then(|| word.trailing_zeros());
@@ -317,7 +320,7 @@ pub enum BitsError {
     MaterialTooLarge {
         /// The rejected material.
         material: u8,
-        /// For which point.
+        /// The point that it was given for.
         position: [u32; 3],
         /// Bits per point.
         planes: u32,

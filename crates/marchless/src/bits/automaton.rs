@@ -1,9 +1,14 @@
 //! One step of a cellular automaton.
 //!
-//! The neighbours of all points of a word are counted at once, bit by bit of the count: three slabs are added to
-//! numbers of two bits, three of those along x to numbers of four, and three rows of those to numbers of five, the
-//! point itself included. What the rule makes of such a number and of the point is a function of six bits: a decision
-//! diagram, of which every node chooses between two earlier ones, a word at a time.
+//! Neighbours are counted for all 64 points of a word at once. Each bit of the counts has words of its own, which this
+//! file calls a plane. A count includes the point itself:
+//!
+//! 1. Along z: three slabs add up to numbers of two bits.
+//! 2. Along x: three of these add up to numbers of four bits.
+//! 3. Along y: three of these add up to numbers of five bits.
+//!
+//! The rule is then a function of six bits, the count's five and the point's own. It is evaluated as a decision
+//! diagram, a word at a time: each node chooses between two earlier nodes by one of the six bits.
 
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
@@ -11,12 +16,12 @@ use core::ops::Range;
 use super::{BitGrid, BitsError, Connectivity, pattern::Pattern};
 use crate::simd::{Backend, Job, Simd, dispatch_words};
 
-/// When points of a cellular automaton are born and when they survive.
+/// The rule of a cellular automaton: which points are born, and which survive.
 ///
 /// ```
 /// use marchless::{Shape, bits::{BitGrid, Rule}};
 ///
-/// // Caves: noise, in which every point follows most of its neighbours.
+/// // Caves from noise: every point follows the majority of its neighbours.
 /// let mut noise = 1u32;
 /// let mut caves = BitGrid::from_fn(Shape::cube(64)?, |_| {
 ///     noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -31,20 +36,24 @@ use crate::simd::{Backend, Job, Simd, dispatch_words};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rule {
-    /// A bit for each count of neighbours.
+    /// Bit `n`: points with `n` set neighbours are born.
     birth: u32,
+    /// Bit `n`: points with `n` set neighbours survive.
     survival: u32,
+    /// Points outside the grid count as set.
     outside: bool,
     connectivity: Connectivity,
 }
 
 impl Rule {
-    /// A rule by which a point that is not set becomes so where it has one of the counts `birth` of set neighbours, and
-    /// one that is set stays so where it has one of the counts `survival`; in any order. All 26 neighbours count, and
-    /// points outside the grid are not set.
+    /// A rule with these counts of set neighbours, in any order: an unset point becomes set if its count is in `birth`;
+    /// a set point stays set if its count is in `survival`.
+    ///
+    /// All 26 neighbours count, and points outside the grid are not set; [`with_connectivity`](Self::with_connectivity)
+    /// and [`with_outside`](Self::with_outside) change that.
     ///
     /// # Errors
-    /// [`BitsError::NeighbourCount`] where a count is above 26.
+    /// [`BitsError::NeighbourCount`] if a count is above 26.
     pub fn new(birth: &[u8], survival: &[u8]) -> Result<Self, BitsError> {
         let bits = |counts: &[u8]| {
             counts.iter().try_fold(0, |bits, &count| match count {
@@ -56,13 +65,13 @@ impl Rule {
         Ok(Self { birth, survival, outside: false, connectivity: Connectivity::TwentySix })
     }
 
-    /// Whether points outside the grid count as set.
+    /// The same rule with points outside the grid counted as set, or as not set.
     #[must_use]
     pub const fn with_outside(self, outside: bool) -> Self {
         Self { outside, ..self }
     }
 
-    /// Which neighbours count.
+    /// The same rule with other neighbours counted.
     #[must_use]
     pub const fn with_connectivity(self, connectivity: Connectivity) -> Self {
         Self { connectivity, ..self }
@@ -70,7 +79,7 @@ impl Rule {
 }
 
 impl BitGrid {
-    /// The grid one step of `rule` later.
+    /// The grid after one step of `rule`.
     #[must_use]
     pub fn stepped(&self, rule: &Rule) -> Self {
         let mut out = self.zeros();
@@ -89,6 +98,7 @@ impl BitGrid {
     }
 }
 
+/// One step of a rule, from one grid into another.
 struct Step<'a> {
     from: &'a BitGrid,
     rule: &'a Rule,
@@ -125,22 +135,25 @@ impl Job for Step<'_> {
     }
 }
 
-/// Words that are counted and decided together.
+/// The number of words that are counted and decided together.
 const BLOCK: usize = 32;
 
-/// How many points are set around each point of a slab, the bits of a number each in their own plane.
+/// The counts of set points around each point of a slab, with one plane for each bit of a count.
 struct Sums {
     connectivity: Connectivity,
+    /// Words per row.
     row: usize,
     ends: Ends,
+    /// A word of points outside the grid.
     outside: u64,
-    /// The slab itself, and the sums of it and the slabs below and above: numbers of two bits. With one more word on
-    /// either side.
+    /// The slab itself, with one extra word before it and more after it.
     here: Vec<u64>,
+    /// The sums of the slab and the slabs below and above: numbers of two bits. Laid out like `here`.
     along_z: [Vec<u64>; 2],
-    /// The points around a point in its own row, and in the rows beside it, all three slabs together. With a row more
-    /// on either side, and up to a multiple of [`BLOCK`].
+    /// What each row adds to its own counts, over all three slabs. An extra row lies on either side, then [`BLOCK`]
+    /// words more. Unused for 26 neighbours, where it would equal `sides`.
     centre: [Vec<u64>; 4],
+    /// What each row adds to the counts of the rows beside it, over all three slabs. Laid out like `centre`.
     sides: [Vec<u64>; 4],
 }
 
@@ -149,7 +162,8 @@ impl Sums {
     fn new(grid: &BitGrid, rule: &Rule) -> Self {
         let (row, rows) = (grid.row, grid.shape.size()[1] as usize);
         let padded = || vec![0; row * rows + 2 + BLOCK];
-        // What there is in the row beside one at the border: it is filled once, and never written to again.
+        // What a row outside the grid adds to the row beside it if points there are set. The extra rows are filled with
+        // it here, and nothing overwrites them.
         let in_row_outside: u32 = match rule.connectivity {
             Connectivity::Six => 1,
             Connectivity::Eighteen => 5,
@@ -175,7 +189,7 @@ impl Sums {
         }
     }
 
-    /// Adds up along z and x.
+    /// Adds up a slab's points along z, then along x.
     #[inline(always)]
     fn add(&mut self, [below, here, above]: [&[u64]; 3]) {
         let slab = here.len();
@@ -202,13 +216,14 @@ impl Sums {
                 self.sides[0][rows].copy_from_slice(here);
             }
         }
-        // The points themselves, for the decision.
+        // The decision needs the points themselves.
         if self.connectivity == Connectivity::TwentySix {
             self.here[1..=slab].copy_from_slice(here);
         }
     }
 
-    /// The bits of the counts of a block, the point itself included, and those of the points.
+    /// The six bits that decide a block's points: five of the count, which includes the point itself, and the point's
+    /// own.
     #[inline(always)]
     fn counts(&self, at: usize) -> [[u64; BLOCK]; 6] {
         let centre = if self.connectivity == Connectivity::TwentySix { &self.sides } else { &self.centre };
@@ -228,15 +243,16 @@ impl Sums {
     }
 }
 
-/// A block of all planes.
+/// One block of each of the four planes.
 #[inline(always)]
 fn blocks([a, b, c, d]: &[Vec<u64>; 4], at: usize) -> [&[u64; BLOCK]; 4] {
     [block(a, at), block(b, at), block(c, at), block(d, at)]
 }
 
+/// The block of a plane that starts with word `at`.
 #[inline(always)]
 fn block(plane: &[u64], at: usize) -> &[u64; BLOCK] {
-    plane[at..].first_chunk().expect("planes go on for a block behind their last row")
+    plane[at..].first_chunk().expect("planes have a block of words after their last row")
 }
 
 /// One range of words of each of the four planes.
@@ -246,13 +262,13 @@ fn parts(planes: &mut [Vec<u64>; 4], words: Range<usize>) -> [&mut [u64]; 4] {
     [&mut a[words.clone()], &mut b[words.clone()], &mut c[words.clone()], &mut d[words]]
 }
 
-/// The points beside those of a word, at −x and at +x, of the word before it, itself and the word behind it.
+/// The neighbours at −x and at +x of a word's points, from the word before it, the word itself and the word after it.
 #[inline(always)]
 const fn beside([low, here, high]: [u64; 3]) -> [u64; 2] {
     [here << 1 | low >> 63, here >> 1 | high << 63]
 }
 
-/// Which points have a neighbour at −x and at +x in the same row, for each word of a row.
+/// Masks of the points that have a neighbour in their row, at −x and at +x, for each word of a row.
 struct Ends {
     from_low: Pattern,
     from_high: Pattern,
@@ -270,13 +286,14 @@ impl Ends {
     }
 }
 
-/// Adds three bits: the sum's low bit and its high one.
+/// Adds three bits. Returns the low and the high bit of the sum.
 #[inline(always)]
 const fn full([a, b, c]: [u64; 3]) -> [u64; 2] {
     [a ^ b ^ c, a & b | c & (a ^ b)]
 }
 
-/// The sums of three numbers of two bits along x. Numbers have a word more on either side, whatever it is.
+/// Adds up, along x, the numbers of two bits of each point and its two neighbours. `low` and `high` have one more word
+/// on either side, with any content.
 #[inline(always)]
 fn square(low: &[u64], high: &[u64], ends: &Ends, outside: u64, out: [&mut [u64]; 4]) {
     let (from_low, from_high) = (ends.from_low.words(), ends.from_high.words());
@@ -304,8 +321,8 @@ fn square(low: &[u64], high: &[u64], ends: &Ends, outside: u64, out: [&mut [u64]
     }
 }
 
-/// The sums of a number of two bits and the points beside it along x. Numbers and points have a word more on either
-/// side, whatever it is.
+/// Adds to each point's number of two bits the bits of its two neighbours along x. `low`, `high` and `here` have one
+/// more word on either side, with any content.
 #[inline(always)]
 fn cross(low: &[u64], high: &[u64], here: &[u64], ends: &Ends, outside: u64, out: [&mut [u64]; 3]) {
     let (from_low, from_high) = (ends.from_low.words(), ends.from_high.words());
@@ -326,32 +343,35 @@ fn cross(low: &[u64], high: &[u64], here: &[u64], ends: &Ends, outside: u64, out
     }
 }
 
-/// Values that a diagram knows at most: none, all, and at most 1 + 2 + 4 + 8 + 12 + 2 functions of the six bits.
+/// The most values that a diagram can have: zeros, ones, and at most 1 + 2 + 4 + 8 + 12 + 2 functions of the six bits.
 const MAX_VALUES: usize = 32;
 
 /// A function of six bits, as a reduced ordered binary decision diagram (Bryant 1986).
 struct Diagram {
     choices: [Choice; MAX_VALUES],
+    /// The number of values, with zeros and ones.
     len: usize,
-    /// Which value is the function's.
+    /// The index of the whole function's value.
     result: usize,
 }
 
-/// A value made of two earlier ones.
+/// A node of a diagram: a value that is chosen from two earlier ones by a bit.
 #[derive(Clone, Copy, Default)]
 struct Choice {
     /// The function as a table of `2^(bit + 1)` entries.
     table: u64,
     bit: usize,
+    /// The index of the value where the bit is zero.
     zero: usize,
+    /// The index of the value where the bit is one.
     one: usize,
 }
 
 impl Diagram {
-    /// What `rule` makes of a count that includes the point itself, in bits 0–4, and of the point, bit 5.
+    /// The diagram of `rule`. Bits 0–4 of its input are a count that includes the point itself, bit 5 is the point.
     fn new(rule: &Rule) -> Self {
         let entry = |index: u32| {
-            // Counts that cannot be are taken for others, so that fewer choices remain.
+            // Counts above 27 do not occur. They share the entries of lower counts, which makes the diagram smaller.
             let count = if index & 31 > 27 { index & 27 } else { index & 31 };
             let (counts, count) =
                 if index < 32 { (rule.birth, count.min(26)) } else { (rule.survival, count.saturating_sub(1)) };
@@ -362,7 +382,7 @@ impl Diagram {
         diagram
     }
 
-    /// The value of a table of `2^bits` entries.
+    /// The index of the value for a table of `2^bits` entries. Adds the nodes that are missing.
     fn value(&mut self, table: u64, bits: usize) -> usize {
         let all = u64::MAX >> (64 - (1 << bits));
         if table == 0 || table == all {
@@ -383,7 +403,7 @@ impl Diagram {
         self.len - 1
     }
 
-    /// The function of a block of bits. The first of `values` is zero, the second all ones; the others are overwritten.
+    /// Evaluates the function for a block of bits. `values` starts with zeros and all ones; the rest is overwritten.
     #[inline(always)]
     fn decide<'a>(&self, bits: &[[u64; BLOCK]; 6], values: &'a mut [[u64; BLOCK]; MAX_VALUES]) -> &'a [u64; BLOCK] {
         for index in 2..self.len {

@@ -1,25 +1,23 @@
-//! The case index of every cell: eight bits that say which of its corners are set, which is what marching cubes looks
-//! up in its tables.
+//! The case index of every cell: eight bits that say which of its corners are set. Marching cubes looks them up in its
+//! tables.
 //!
-//! There are two ways to make many of them at once, both of which ask no cell for its corners one by one:
+//! Two known methods make many masks at once, without a look at each corner of each cell:
 //!
-//! - *Shifted copies* ("Marchless Cubes: Bitfield SIMD Voxel Meshing"). Shifted down by one along an axis, the bits lie
-//!   where their neighbours lay, so that the grid and seven shifted copies of it hold the eight corners of all cells at
-//!   the same places. The bits of each copy are spread out, one to a byte; copy k's go to bit k. That takes eight
-//!   spreadings and eight ors, the same number of operations whatever the bits are, as long as the grid fits into
-//!   registers. [`Tile`](super::Tile) is such a grid.
+//! - *Shifted copies* ("Marchless Cubes: Bitfield SIMD Voxel Meshing"). A shift down by one along an axis puts each bit
+//!   where its neighbour was. So the grid and seven shifted copies hold the eight corners of a cell at one place. The
+//!   bits of copy k are spread out, one to a byte, and go to bit k of the masks. This takes eight spreads and eight
+//!   ors, whatever the bits are, but the grid must fit into registers. [`Tile`](super::Tile) is such a grid.
 //! - *Word strides* (an article on building cell masks from rows of sign bits held in words along one axis). Four
-//!   passes over the rows, one for each edge of a cell that runs along them. A pass looks at each bit of a word; where
-//!   it is set, it sets one bit in the mask of each of the two cells that share that corner. Each row is read four
-//!   times and the masks are written up to four times, and there is a branch for each bit: words of zeros cost next to
-//!   nothing, and noise costs most.
+//!   passes go over the rows, one for each edge of a cell that runs along them. A pass looks at each bit of a word.
+//!   Where the bit is set, the pass sets one bit in the masks of the two cells that share that corner. Each row is read
+//!   four times, masks are written up to four times, and each bit has a branch: words of zeros cost next to nothing,
+//!   and noise costs most.
 //!
-//! Ours takes the copies from the first and the words from the second. A row of cells has four rows of corners, and
-//! their words are four of the eight copies; the other four are the same words shifted by one, with the lowest bit of
-//! the next word on top. Eight words with the corners of 64 cells become 64 bytes by a transposition of 8 × 64 bits.
-//! Each mask is written once, the rows are short enough to be read from the nearest cache when they come again, and
-//! there is no branch that depends on a bit: the grid may be of any size, and what is in it makes no difference to the
-//! time.
+//! This module takes the copies from the first and the words from the second. A row of cells has four rows of corners.
+//! Their words are four of the eight copies. The other four are the same words shifted down by one, with the lowest bit
+//! of the next word on top. A transposition of 8 × 64 bits turns these eight words into the 64 bytes of 64 cells. Each
+//! mask is written once; the rows are short enough to be in the nearest cache when they are read again; no branch
+//! depends on a bit. So the grid may have any size, and its content does not change the time.
 
 use alloc::vec::Vec;
 
@@ -40,19 +38,18 @@ impl BitGrid {
     /// ```
     ///
     /// # Errors
-    /// [`BitsError::TooSmall`] where there are less than 2 points on an axis, [`BitsError::TooLarge`] where memory does
-    /// not hold the masks.
+    /// [`BitsError::TooSmall`] below 2 points per axis, [`BitsError::TooLarge`] if memory cannot hold the masks.
     pub fn case_masks(&self) -> Result<Vec<u8>, BitsError> {
         let mut masks = Vec::new();
         self.case_masks_into(&mut masks)?;
         Ok(masks)
     }
 
-    /// As [`case_masks`](Self::case_masks), into a vector whose memory is used again. What was in it goes; on errors it
-    /// stays as it was.
+    /// [`case_masks`](Self::case_masks) into an existing vector, whose content is replaced and whose memory is reused.
+    /// On errors the vector is unchanged.
     ///
     /// # Errors
-    /// As [`case_masks`](Self::case_masks).
+    /// Those of [`case_masks`](Self::case_masks).
     pub fn case_masks_into(&self, masks: &mut Vec<u8>) -> Result<(), BitsError> {
         self.case_masks_with(Backend::fastest(), masks)
     }
@@ -70,14 +67,14 @@ impl BitGrid {
     }
 }
 
-/// Makes `masks` this long, as it was where memory does not hold that. What it holds then means nothing.
+/// Makes `masks` this long; its content is then arbitrary. If memory cannot hold that, `masks` is unchanged.
 pub(super) fn resize(masks: &mut Vec<u8>, len: usize) -> Result<(), ()> {
     masks.try_reserve_exact(len.saturating_sub(masks.len())).map_err(|_| ())?;
     masks.resize(len, 0);
     Ok(())
 }
 
-/// All cells of a grid.
+/// The masks of all cells of a grid.
 struct CaseMasks<'a> {
     grid: &'a BitGrid,
     cells: [usize; 3],
@@ -100,7 +97,7 @@ impl Job for CaseMasks<'_> {
     }
 }
 
-/// The masks of one row of cells, at the start of `masks`, which holds those of the rows behind it as well: they may be
+/// Writes the masks of one row of cells to the start of `masks`. The masks of later rows follow there; they may be
 /// overwritten.
 #[inline(always)]
 fn row_masks<S: Simd>(rows: [&[u64]; 4], cells: usize, masks: &mut [u8]) {
@@ -114,14 +111,14 @@ fn row_masks<S: Simd>(rows: [&[u64]; 4], cells: usize, masks: &mut [u8]) {
     for (word, block) in blocks.iter_mut().take(words).enumerate() {
         *block = bytes(word);
     }
-    // The last rows of all.
+    // Only in the grid's last rows: no whole block is left for the last masks.
     if blocks.len() < words {
         rest.copy_from_slice(&bytes(words - 1)[..rest.len()]);
     }
 }
 
-/// The words of the eight corners of 64 cells, from those of the four rows on their low side and from what follows in
-/// these rows.
+/// The words of the eight corners of 64 cells, from a word of each of the four rows of corners and the next word of
+/// each.
 #[inline(always)]
 fn corners(low: [u64; 4], next: [u64; 4]) -> [u64; 8] {
     let [a, b, c, d] = low;

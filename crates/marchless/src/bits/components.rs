@@ -1,8 +1,8 @@
 //! Connected components.
 //!
-//! A component is made of runs of set bits, which are found a word at a time; runs of neighbouring rows that touch are
-//! joined by union–find. A run's root is the first of its component, so that the last pass, which numbers the
-//! components, meets a root before what belongs to it.
+//! A component consists of runs of set bits, which are found a word at a time. Union–find joins the runs of
+//! neighbouring rows that touch. The root of a component is its first run, so the last pass, which numbers the
+//! components, meets each root before the other runs of its component.
 
 use alloc::vec::Vec;
 
@@ -16,7 +16,7 @@ use crate::{
     simd::{Backend, Job, Simd, dispatch_words},
 };
 
-/// The connected components of a grid's set points, numbered by their first points in the order of memory.
+/// The connected components of a grid's set points, numbered by their first points in memory order.
 ///
 /// ```
 /// use marchless::{Shape, bits::{BitGrid, Connectivity}};
@@ -29,7 +29,7 @@ use crate::{
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 ///
-/// Memory is in proportion to the runs of set bits and to the rows, not to the points.
+/// Memory is proportional to the number of runs of set bits and of rows, not of points.
 #[derive(Clone, Debug)]
 pub struct Components {
     shape: Shape,
@@ -44,9 +44,9 @@ pub struct Components {
 pub struct Component {
     /// The number of its points.
     pub size: usize,
-    /// The smallest region that holds it; coordinates that `i32` lacks become the highest one (it may then be empty).
+    /// The smallest region that holds it. Coordinates beyond `i32` become `i32::MAX`; the region may then be empty.
     pub bounds: Region,
-    /// Its first point in the order of memory: that of the lowest z, among these of the lowest y, then of the lowest x.
+    /// Its first point in memory order: lowest z, then lowest y, then lowest x.
     pub first: [u32; 3],
 }
 
@@ -59,7 +59,8 @@ impl BitGrid {
     }
 }
 
-/// Joins all runs that touch. Gives each a parent in its component: the first run itself, or one before it.
+/// Joins all runs that touch. Returns a parent for each run: itself for a component's first run, an earlier run of the
+/// same component for the others.
 struct Join<'a> {
     grid: &'a BitGrid,
     runs: &'a Runs,
@@ -97,20 +98,20 @@ impl Job for Join<'_> {
 }
 
 impl Join<'_> {
-    /// Joins the runs of two rows that overlap, and where the neighbourhood is `wide` those that follow one another.
+    /// Joins the runs of two rows that overlap; if the neighbourhood is `wide`, also those that touch diagonally.
     #[inline(always)]
     fn join(&self, row_a: usize, row_b: usize, wide: bool, parents: &mut [usize]) {
         let len = self.grid.row;
         let words_a = &self.grid.words[row_a * len..][..len];
         let words_b = &self.grid.words[row_b * len..][..len];
-        // How many runs started in the words before, and whether the last bit there is set.
+        // The number of runs that start before this word, and the last bit of the word before.
         let (mut run_a, mut run_b) = (self.runs.starts[row_a], self.runs.starts[row_b]);
         let (mut last_a, mut last_b) = (0, 0);
         let wide = if wide { u64::MAX } else { 0 };
         for (&a, &b) in words_a.iter().zip(words_b) {
             let (behind_a, behind_b) = (a << 1 | last_a, b << 1 | last_b);
             let (starts_a, starts_b) = (a & !behind_a, b & !behind_b);
-            // Two runs touch first where one starts, and the other has a bit there or just before.
+            // The lowest place where two runs touch is where one starts and the other has a bit there or just before.
             let touching = starts_a & (b | behind_b & wide) | starts_b & (a | behind_a & wide);
             for bit in set_bits(touching) {
                 let until = u64::MAX >> (63 - bit);
@@ -125,14 +126,14 @@ impl Join<'_> {
     }
 }
 
-/// Makes one set of those that two runs are in. A parent is never behind its child.
+/// Unites the sets of two runs. A parent never comes after its child.
 #[inline(always)]
 fn union(parents: &mut [usize], a: usize, b: usize) {
     let (a, b) = (root(parents, a), root(parents, b));
     parents[a.max(b)] = a.min(b);
 }
 
-/// The first run of a set, as far as it is known; halves the way to it.
+/// The root of a run's set, which is its first run; halves the path to it.
 #[inline(always)]
 fn root(parents: &mut [usize], mut run: usize) -> usize {
     while parents[run] != run {
@@ -142,7 +143,7 @@ fn root(parents: &mut [usize], mut run: usize) -> usize {
     run
 }
 
-/// Makes numbers of components out of parents, and counts and bounds what belongs to each.
+/// Numbers the components, and gives each its size, bounds and first point.
 fn number(shape: Shape, runs: Runs, mut parents: Vec<usize>) -> Components {
     let ny = shape.size()[1] as usize;
     let saturated = |v: u32| i32::try_from(v).unwrap_or(i32::MAX);
@@ -161,11 +162,11 @@ fn number(shape: Shape, runs: Runs, mut parents: Vec<usize>) -> Components {
                     first: [start, y, z],
                 });
             } else {
-                // The parent came before, and is a number by now.
+                // The parent comes earlier: its entry already holds its component's number.
                 parents[run] = parents[parents[run]];
                 let component = &mut components[parents[run]];
                 component.size += (end - start) as usize;
-                // Not a union of regions, which leaves out empty ones: beyond `i32`, this may be one.
+                // Not the union of regions: it ignores empty regions, and beyond `i32` this one may be empty.
                 let bounds = &mut component.bounds;
                 for axis in 0..3 {
                     bounds.min[axis] = bounds.min[axis].min(min[axis]);
@@ -183,12 +184,12 @@ impl Components {
         self.components.len()
     }
 
-    /// True if there is no component, since no point is set.
+    /// True if there is no component: no point is set.
     pub const fn is_empty(&self) -> bool {
         self.components.is_empty()
     }
 
-    /// The component of this number.
+    /// The component with this number; `None` if there is none.
     pub fn get(&self, index: usize) -> Option<&Component> {
         self.components.get(index)
     }
@@ -198,7 +199,7 @@ impl Components {
         self.components.iter()
     }
 
-    /// The number of the largest component, and the first of several; `None` if there is no component.
+    /// The number of the largest component, the first of equals; `None` if there is no component.
     pub fn largest(&self) -> Option<usize> {
         let most = self.components.iter().map(|component| component.size).max()?;
         self.components.iter().position(|component| component.size == most)
@@ -222,7 +223,7 @@ impl Components {
         let mut grid = BitGrid::empty(self.shape);
         let Some(Component { bounds, .. }) = self.get(index) else { return grid };
         let [_, ny, nz] = self.shape.size();
-        // Where the highest coordinate that `i32` has stands for higher ones, up to the end of the grid.
+        // `i32::MAX` stands for all higher coordinates, up to the end of the grid.
         let rows = |axis: usize, size: u32| {
             let [min, max] = [bounds.min[axis], bounds.max[axis]];
             min as u32..if max == i32::MAX { size } else { max as u32 }
@@ -245,7 +246,7 @@ impl Components {
         grid
     }
 
-    /// Sets the points of a row whose component's number is among those `wanted`.
+    /// Sets the points of a row whose component's number is `wanted`.
     fn write_row(&self, row: usize, wanted: impl Fn(usize) -> bool, grid: &mut BitGrid) {
         let words = &mut grid.words[row * grid.row..][..grid.row];
         for run in self.runs.starts[row]..self.runs.starts[row + 1] {
@@ -274,7 +275,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_beyond_the_coordinates_of_regions_is_not_lost() {
+    fn components_beyond_i32_coordinates_keep_their_points() {
         let nx = (1u32 << 31) + 64;
         let shape = Shape::new([nx, 3, 1]).unwrap();
         let span = [nx - 10, nx - 4];

@@ -1,13 +1,13 @@
 //! [`Connectivity`]: the neighbourhood of a point.
 
-/// The choice of neighbours among the 26 points around a point.
+/// The neighbourhood of a point: which of the 26 points around it are its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Connectivity {
-    /// The 6 that share a face, of cubes around the points.
+    /// The 6 neighbours whose unit cubes share a face with the point's.
     Six,
-    /// The 18 that share a face or an edge.
+    /// The 18 neighbours whose unit cubes share a face or an edge with the point's.
     Eighteen,
-    /// All 26: those that share a face, an edge or a corner.
+    /// All 26 neighbours, whose unit cubes share a face, an edge or a corner with the point's.
     TwentySix,
 }
 

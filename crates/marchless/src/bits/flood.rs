@@ -1,8 +1,8 @@
-//! Filling from seeds through a mask.
+//! Flood fill from seeds through a mask.
 //!
-//! Row by row: what is new in a row is spread to the rows beside it, where the runs of the mask that it touches become
-//! new at once, each of them only once. Rows with something new wait in a queue, so that as much as possible is new by
-//! the time that a row's turn comes. The work is in proportion to the rows reached, mazes apart.
+//! The flood goes row by row. Points that are new in a row spread to the rows beside it. There, each run of the mask
+//! that they touch becomes new as a whole, once. Rows with new points wait in a queue, so that many points are new by
+//! the time a row's turn comes. The work is proportional to the number of rows reached, except in mazes.
 
 use alloc::{collections::VecDeque, vec, vec::Vec};
 
@@ -12,8 +12,8 @@ impl BitGrid {
     /// The set points that are connected to any seed through set points. The grid is the mask; seeds that are not set
     /// fill nothing.
     ///
-    /// A step fills a whole row, which suits caves and terrain. The paths of a maze return to the same rows many times;
-    /// there, [`components`](Self::components) takes far less time.
+    /// A step fills whole runs of a row, which suits caves and terrain. The paths of a maze return to the same rows
+    /// many times; [`components`](Self::components) takes far less time there.
     ///
     /// ```
     /// use marchless::{Shape, bits::{BitGrid, Connectivity}};
@@ -24,7 +24,7 @@ impl BitGrid {
     /// ```
     ///
     /// # Errors
-    /// [`BitsError::OutOfRange`] where the grid has no such point as a seed.
+    /// [`BitsError::OutOfRange`] if a seed lies outside the grid.
     pub fn flood(&self, seeds: &[[u32; 3]], connectivity: Connectivity) -> Result<Self, BitsError> {
         let mut flood = Flood::new(self);
         let mut source = vec![0; self.row];
@@ -42,7 +42,7 @@ impl BitGrid {
     /// Fills from the points of another grid of the same shape, as [`flood`](Self::flood) does from a list.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`].
+    /// [`BitsError::ShapesDiffer`] if `seeds` has another shape.
     pub fn flood_from(&self, seeds: &Self, connectivity: Connectivity) -> Result<Self, BitsError> {
         self.same_shape(seeds)?;
         let mut flood = Flood::new(self);
@@ -53,13 +53,13 @@ impl BitGrid {
     }
 }
 
-/// A flood on its way. What is filled are whole runs of the mask, always.
+/// A flood in progress. It fills whole runs of the mask only.
 struct Flood<'a> {
     mask: &'a BitGrid,
     filled: BitGrid,
-    /// What is filled, but not spread yet.
+    /// The filled points that have not spread yet, laid out as in `filled`.
     fresh: Vec<u64>,
-    /// The rows where something is.
+    /// The rows with fresh points.
     queue: VecDeque<usize>,
 }
 
@@ -69,7 +69,7 @@ impl<'a> Flood<'a> {
         Self { mask, filled: BitGrid::empty(mask.shape), fresh, queue: VecDeque::new() }
     }
 
-    /// Spreads until nothing is new.
+    /// Spreads until no point is fresh.
     fn run(mut self, connectivity: Connectivity) -> BitGrid {
         let len = self.mask.row;
         let [_, ny, nz] = self.mask.shape.size().map(|size| size as usize);
@@ -106,7 +106,7 @@ impl<'a> Flood<'a> {
         self.filled
     }
 
-    /// Fills the runs of a row that `source` has a bit of.
+    /// Fills the runs of a row that have a bit set in `source`.
     #[inline]
     fn fill(&mut self, row: usize, source: &[u64]) {
         let len = self.mask.row;
@@ -124,7 +124,7 @@ impl<'a> Flood<'a> {
         if fresh.iter().all(|&word| word == 0) {
             self.queue.push_back(row);
         }
-        // Upwards: adding a bit to a run makes zeros of what is above it in the run, and carries into the next word.
+        // Upwards: adding a bit to a run clears all bits from there to the run's end, and carries into the next word.
         let mut carry = false;
         for (((&source, &mask), &filled), fresh) in source.iter().zip(mask).zip(&*filled).zip(&mut *fresh) {
             let free = mask & !filled;
@@ -134,7 +134,7 @@ impl<'a> Flood<'a> {
             carry = over | over_again;
             *fresh |= free & !sum | seeds;
         }
-        // Downwards, by steps of 1, 2, 4 to 32 bits.
+        // Downwards, in steps of 1, 2, 4 to 32 bits.
         let mut carry = 0;
         for ((&mask, filled), fresh) in mask.iter().zip(filled).zip(fresh).rev() {
             let mut free = mask & !*filled;
@@ -152,7 +152,7 @@ impl<'a> Flood<'a> {
     }
 }
 
-/// Adds to each bit the one before and the one behind it.
+/// Sets each bit that is set or has a set neighbour in its row.
 fn widen(exact: &[u64], wide: &mut [u64]) {
     let mut before = 0;
     for (index, (&word, wide)) in exact.iter().zip(wide).enumerate() {

@@ -1,4 +1,4 @@
-//! Boolean operations on whole grids, and cutting a box out of one.
+//! Boolean operations on whole grids, and cutting a box out of a grid.
 
 use super::{BitGrid, BitsError, paste::word_at};
 use crate::{
@@ -45,7 +45,7 @@ impl BitGrid {
         self.clear_unused();
     }
 
-    /// Makes the grid the same as `other`, in the memory that it has.
+    /// Copies all bits of `other` into the existing memory.
     ///
     /// # Errors
     /// [`BitsError::ShapesDiffer`]; the grid is then unchanged.
@@ -55,8 +55,8 @@ impl BitGrid {
         Ok(())
     }
 
-    /// The grid of the points in `region`, which may reach beyond this one: point `p` of it is point `region.min + p`
-    /// of this one. Points outside are zero.
+    /// The points in `region` as a grid of their own: its point `p` is point `region.min + p` of this grid. The region
+    /// may reach beyond this grid; points outside are zero.
     ///
     /// ```
     /// use marchless::{Region, Shape, bits::BitGrid};
@@ -68,8 +68,8 @@ impl BitGrid {
     /// ```
     ///
     /// # Errors
-    /// [`BitsError::RegionSize`] where the region is empty or has more points than can be counted,
-    /// [`BitsError::TooLarge`] where memory does not hold the grid.
+    /// [`BitsError::RegionSize`] if the region is empty or has more points than can be counted, [`BitsError::TooLarge`]
+    /// if memory cannot hold the grid.
     pub fn cut(&self, region: Region) -> Result<Self, BitsError> {
         let shape = Shape::new(region.size()).map_err(|_| BitsError::RegionSize { region })?;
         let mut cut = Self::new(shape)?;
@@ -91,8 +91,8 @@ impl BitGrid {
         Ok(cut)
     }
 
-    /// Replaces each word by what `combine` makes of it and the other grid's. Unused bits stay zero where it makes zero
-    /// of zeros.
+    /// Replaces each word by `combine` of it and the other grid's word. Unused bits stay zero if `combine` of two zero
+    /// bits is zero.
     fn combine(&mut self, other: &Self, combine: impl Fn(u64, u64) -> u64) -> Result<(), BitsError> {
         self.same_shape(other)?;
         dispatch_words(Backend::fastest(), Combine { words: &mut self.words, others: &other.words, combine });

@@ -1,4 +1,4 @@
-//! [`MaterialGrid`]: a grid of more than two materials. It meshes the boundary of any of them against the rest.
+//! [`MaterialGrid`]: a grid of up to 256 materials. It meshes the boundary of any set of materials against the rest.
 
 mod planes;
 mod selection;
@@ -15,8 +15,8 @@ use crate::{
 use planes::FillPlanes;
 use selection::{MaterialSet, Selection};
 
-/// One material of 4 to 256 for each lattice point, in 2 to 8 planes of bits: bit `k` of a point's material is its bit
-/// in plane `k`.
+/// A grid of one material for each lattice point, in 2 to 8 planes of bits, for 4 to 256 materials: bit `k` of a
+/// point's material is its bit in plane `k`.
 ///
 /// ```
 /// use marchless::{MeshBuffer, Shape, bits::MaterialGrid};
@@ -43,10 +43,10 @@ pub struct MaterialGrid {
 }
 
 impl MaterialGrid {
-    /// A grid of material 0; `planes`: bits per point, 2 to 8.
+    /// A grid of material 0 with `planes` bits per point, 2 to 8.
     ///
     /// # Errors
-    /// [`BitsError::PlanesOutOfRange`], [`BitsError::TooLarge`] if memory cannot hold it.
+    /// [`BitsError::PlanesOutOfRange`], [`BitsError::TooLarge`] if memory cannot hold the grid.
     pub fn new(shape: Shape, planes: u32) -> Result<Self, BitsError> {
         if !(2..=8).contains(&planes) {
             return Err(BitsError::PlanesOutOfRange { found: planes });
@@ -58,8 +58,8 @@ impl MaterialGrid {
     /// The grid of these materials: `[nx·ny·nz]`, x fastest, each below 2 to the power of `planes`.
     ///
     /// # Errors
-    /// [`BitsError::MaterialsLength`] where the slice's length is not the shape's, [`BitsError::MaterialTooLarge`], and
-    /// as [`new`](Self::new).
+    /// [`BitsError::MaterialsLength`] if the slice's length is not the shape's, [`BitsError::MaterialTooLarge`], and
+    /// those of [`new`](Self::new).
     pub fn from_materials(shape: Shape, materials: &[u8], planes: u32) -> Result<Self, BitsError> {
         let mut grid = Self::new(shape, planes)?;
         if materials.len() != shape.len() {
@@ -82,7 +82,7 @@ impl MaterialGrid {
         self.planes[0].shape
     }
 
-    /// The planes, that of the lowest bit first.
+    /// The planes, lowest bit first.
     pub fn planes(&self) -> &[BitGrid] {
         &self.planes
     }
@@ -97,8 +97,8 @@ impl MaterialGrid {
     /// Sets the material of a point.
     ///
     /// # Errors
-    /// [`BitsError::OutOfRange`] where the grid has no such point, [`BitsError::MaterialTooLarge`]; nothing has changed
-    /// then.
+    /// [`BitsError::OutOfRange`] if the grid has no such point, [`BitsError::MaterialTooLarge`]; the grid is then
+    /// unchanged.
     pub fn set(&mut self, position: [u32; 3], material: u8) -> Result<(), BitsError> {
         if !self.holds(material) {
             return Err(BitsError::MaterialTooLarge { material, position, planes: self.planes.len() as u32 });
@@ -106,9 +106,9 @@ impl MaterialGrid {
         self.planes.iter_mut().enumerate().try_for_each(|(k, plane)| plane.set(position, material >> k & 1 == 1))
     }
 
-    /// The points of any of these materials. No point has a material that does not fit the planes.
+    /// The points that have any of these materials. Materials that do not fit the planes select nothing.
     ///
-    /// A few word operations per 64 points: as many as there are planes for one material, at most 77 for any set.
+    /// This takes a few word operations per 64 points: one per plane for a single material, at most 77 for any set.
     pub fn select(&self, materials: impl IntoIterator<Item = u8>) -> BitGrid {
         self.select_set(&materials.into_iter().collect())
     }
@@ -116,26 +116,27 @@ impl MaterialGrid {
     /// [`select`](Self::select) into an existing grid of the same shape, whose content is replaced.
     ///
     /// # Errors
-    /// [`BitsError::ShapesDiffer`].
+    /// [`BitsError::ShapesDiffer`] if `out` has another shape; it is then unchanged.
     pub fn select_into(&self, materials: impl IntoIterator<Item = u8>, out: &mut BitGrid) -> Result<(), BitsError> {
         self.planes[0].same_shape(out)?;
         self.select_set_into(&materials.into_iter().collect(), out);
         Ok(())
     }
 
-    /// Meshes the boundary of these materials against all others into `out`, whose former content is dropped, as
-    /// [`BitGrid::mesh`] does (up to 2²³ cells per axis); [`MeshBuffer::materials`] says which of them is inside at
-    /// each vertex.
+    /// Meshes the boundary of these materials against all others into `out`, whose former content is dropped.
     ///
-    /// Where two materials touch, the boundaries of both have the same vertices, in the middle of the edges between
-    /// them, bit for bit. (In cells where more than two meet, or where a material touches itself along an edge or
-    /// diagonally only, triangles of the two may differ.)
+    /// The mesh is that of [`BitGrid::mesh`], up to 2²³ cells per axis. [`MeshBuffer::materials`] says which of the
+    /// materials is inside at each vertex.
     ///
-    /// To keep memory from mesh to mesh, or to place vertices by a function, [`select`](Self::select) and use a
-    /// [`BitMesher`].
+    /// Where two materials touch, the boundaries of both have the same vertices bit for bit, in the middle of the edges
+    /// between them. Their triangles may differ in cells where more than two materials meet, or where a material
+    /// touches itself only along an edge or a diagonal.
+    ///
+    /// To keep memory from mesh to mesh, or to place vertices by a function, [`select`](Self::select) the points and
+    /// mesh them with a [`BitMesher`].
     ///
     /// # Errors
-    /// As [`BitGrid::mesh`]; `out` is then empty.
+    /// Those of [`BitGrid::mesh`]; `out` is then empty.
     pub fn mesh(&self, materials: impl IntoIterator<Item = u8>, out: &mut MeshBuffer) -> Result<(), MeshError> {
         let inside = self.select_set(&materials.into_iter().collect());
         BitMesher::new().mesh(&inside, out)?;
@@ -143,7 +144,7 @@ impl MaterialGrid {
         Ok(())
     }
 
-    /// Whether a material fits the planes.
+    /// True if a material fits the planes.
     fn holds(&self, material: u8) -> bool {
         u32::from(material) >> self.planes.len() == 0
     }
@@ -159,7 +160,7 @@ impl MaterialGrid {
         out.clear_unused();
     }
 
-    /// Finds the material at the inside end of each vertex's edge; vertices are in the middle.
+    /// Appends the material at the inside end of each vertex's edge. All vertices are in the middle of their edges.
     fn name_materials(&self, inside: &BitGrid, out: &mut MeshBuffer) {
         out.materials.extend(out.positions.iter().map(|middle| {
             let low = middle.map(|v| v as u32);

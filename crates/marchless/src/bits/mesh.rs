@@ -1,7 +1,7 @@
-//! Meshes of bits alone: vertices in the middle of edges, or where a function puts them.
+//! [`BitMesher`]: meshes of bits, with vertices in the middle of edges or where a function puts them.
 //!
-//! Each slab of bits becomes weights of one step inside or outside, of which [`SlabMesher`] makes the mesh: the same
-//! passes, and the same promises. Between −1 and 1, the middle of an edge comes out exactly.
+//! Each slab of bits becomes weights of −1 (set) and 1, which [`SlabMesher`] meshes: the passes are the same, and so
+//! are the guarantees. Between −1 and 1, the crossing is exactly the middle of the edge.
 
 mod placement;
 
@@ -16,10 +16,12 @@ use crate::{
 /// Turns grids of bits into meshes; keeps its scratch memory between them.
 ///
 /// Set bits are inside. The surface is closed, 2-manifold, consistently oriented and free of zero-area and crossing
-/// triangles, except that it is open where it leaves the grid: at the outermost points, up to 2²³ cells per axis
-/// ([placed](Self::mesh_placed): 4,096). It is the mesh that [`Mesher`](crate::Mesher) makes of weights −1 (set) and 1,
-/// byte for byte: one vertex in the middle of each edge between two points of which one is set, exactly, and with the
-/// topology of [`Topology::Separated`](crate::Topology::Separated).
+/// triangles, except that it is open at the outermost points, where it leaves the grid. This holds up to 2²³ cells per
+/// axis ([placed](Self::mesh_placed): 4,096).
+///
+/// The mesh is byte for byte what [`Mesher`](crate::Mesher) makes of weights −1 (set) and 1: one vertex exactly in the
+/// middle of each edge between a set and an unset point, with the topology of
+/// [`Topology::Separated`](crate::Topology::Separated).
 ///
 /// ```
 /// use marchless::{MeshBuffer, MeshReport, Shape, bits::{BitGrid, BitMesher}};
@@ -37,7 +39,7 @@ use crate::{
 #[derive(Clone, Debug, Default)]
 pub struct BitMesher {
     without_normals: bool,
-    /// Made for the first grid.
+    /// `None` before the first grid.
     slabs: Option<SlabMesher<i8>>,
 }
 
@@ -52,15 +54,15 @@ impl BitMesher {
         Self { without_normals: true, slabs: None }
     }
 
-    /// Meshes `bits` into `out`, whose former content is dropped: vertices in the middle of edges, positions in cells
-    /// from the first point. No surface is no error: `out` is then empty.
+    /// Meshes `bits` into `out`, whose former content is dropped. Vertices are in the middle of edges; positions are in
+    /// cells from the first point. A grid without a surface is no error: `out` is then empty.
     ///
-    /// Normals point from set bits to others, as their differences around both ends of the edge say (on a flat or
-    /// slanted face they are even, over steps they are not as smooth as a distance's).
+    /// Normals point from set bits to unset ones. They come from the differences of the bits around both ends of the
+    /// edge. They are uniform on a flat or slanted face, but less smooth over steps than the normals of a distance.
     ///
     /// # Errors
-    /// [`MeshError::TooSmall`] below 2 points per axis, [`MeshError::TooManyVertices`] where vertices would outnumber
-    /// `u32` indices; `out` is then empty.
+    /// [`MeshError::TooSmall`] below 2 points per axis, [`MeshError::TooManyVertices`] if `u32` indices cannot number
+    /// the vertices; `out` is then empty.
     pub fn mesh(&mut self, bits: &BitGrid, out: &mut MeshBuffer) -> Result<(), MeshError> {
         out.clear();
         let meshed = self.mesh_slabs(bits, out);
@@ -74,18 +76,19 @@ impl BitMesher {
     /// edge to where `distance` is zero.
     ///
     /// `distance` takes lattice coordinates (in cells from the first point, up to 1/8 beyond the outermost ones) and is
-    /// negative inside. It need not be a true distance: only its zeros and, for normals, its gradient count. A vertex
-    /// comes from at most 8 evaluations (both ends of the edge, then Chandrupatla's method within them), and 6 more
-    /// for its normal, the direction of the gradient by differences of ±1/8. Smooth functions are met to within the
-    /// rounding of `f32` positions; with any other, the vertex lies between two points with unlike signs.
+    /// negative inside. It need not be a true distance: only its zeros and, for normals, its gradient count.
     ///
-    /// Like all crossings, vertices keep 1/1024 of their edge away from its ends. Where the signs of `distance` at the
-    /// ends are not those of the bits (it is negative at the set one, and only there), or a value is not finite, the
-    /// vertex stays in the middle with the bits' normal; that normal also stays where there is no finite gradient other
-    /// than zero. So the surface is as sound as without placement, whatever `distance` is, up to 4,096 cells per axis.
+    /// A vertex takes at most 8 evaluations: both ends of the edge, then Chandrupatla's method between them. Its normal
+    /// takes 6 more: it is the direction of the gradient, from differences of ±1/8. For smooth functions, the vertex is
+    /// the zero up to the rounding of `f32` positions; for others, it lies between two points where the signs differ.
+    ///
+    /// Like all crossings, vertices stay 1/1024 of their edge away from its ends. The signs of `distance` at both ends
+    /// must be those of the bits: negative at the set end only. Where they are not, or where a value is not finite, the
+    /// vertex stays in the middle with the bits' normal. That normal also stays where the gradient is zero or not
+    /// finite. So the surface is as sound as without placement, whatever `distance` is, up to 4,096 cells per axis.
     ///
     /// # Errors
-    /// As [`mesh`](Self::mesh).
+    /// Those of [`mesh`](Self::mesh).
     pub fn mesh_placed(
         &mut self,
         bits: &BitGrid,
@@ -127,8 +130,8 @@ impl BitMesher {
 }
 
 impl BitGrid {
-    /// Meshes the bits into `out`, whose former content is dropped: one vertex in the middle of each edge between two
-    /// points of which one is set. See [`BitMesher::mesh`], which also keeps its memory from grid to grid.
+    /// Meshes the bits into `out`, whose former content is dropped, with one vertex in the middle of each edge between
+    /// a set and an unset point. See [`BitMesher::mesh`], which also keeps its memory from grid to grid.
     ///
     /// ```
     /// use marchless::{MeshBuffer, Shape, bits::BitGrid};
@@ -148,8 +151,8 @@ impl BitGrid {
         BitMesher::new().mesh(self, out)
     }
 
-    /// Meshes the bits into `out` with each vertex where `distance`, negative inside, is zero on its edge: the bits say
-    /// what hangs together, the function says where. See [`BitMesher::mesh_placed`].
+    /// Meshes the bits into `out`, with each vertex where `distance` is zero on its edge. The bits decide what is
+    /// connected; the function, negative inside, decides where the surface lies. See [`BitMesher::mesh_placed`].
     ///
     /// ```
     /// use marchless::{MeshBuffer, Shape, bits::BitGrid};
@@ -163,13 +166,13 @@ impl BitGrid {
     /// ```
     ///
     /// # Errors
-    /// As [`mesh`](Self::mesh).
+    /// Those of [`mesh`](Self::mesh).
     pub fn mesh_placed(&self, distance: impl Fn([f32; 3]) -> f32, out: &mut MeshBuffer) -> Result<(), MeshError> {
         BitMesher::new().mesh_placed(self, distance, out)
     }
 }
 
-/// The weights of eight bits, the lowest first: −1 where set, 1 where not.
+/// The weights of each byte's eight bits, lowest first: −1 for a set bit, 1 for an unset one.
 static WEIGHTS: [[i8; 8]; 256] = {
     let (mut weights, mut byte) = ([[1; 8]; 256], 0);
     while byte < 256 {

@@ -1,7 +1,8 @@
 //! Dilation, erosion, opening, closing.
 //!
-//! Two slabs at a time, from the lowest y to the highest, a row or a few short ones at once: what is joined along z
-//! stays in registers for two steps, until it has been joined along y, and at once along x.
+//! Two slabs are treated together, from the lowest y to the highest, in steps of one row or a few short ones. A step
+//! joins its words along z and keeps the result in registers for the next two steps, which join it along y. The join
+//! along x follows at once.
 
 use core::array::from_fn;
 
@@ -70,8 +71,7 @@ impl BitGrid {
     }
 }
 
-/// Dilation of what is set after `flip` has been taken into each word, and with `flip` in each word of what comes out:
-/// 0 for dilation, all ones for erosion.
+/// Dilation with `flip` applied to each word before and after (by xor): 0 for dilation, all ones for erosion.
 fn spread(backend: Backend, from: &BitGrid, connectivity: Connectivity, flip: u64, out: &mut BitGrid) {
     dispatch_words(backend, Spread { from, connectivity, flip, out });
 }
@@ -93,7 +93,8 @@ impl Job for Spread<'_> {
             2 => self.strip::<S, 2>(0),
             4 => self.strip::<S, 4>(0),
             row => {
-                // The first and the last word of a strip look at words that it has not, but at the ends of rows.
+                // A strip's first and last words need neighbours outside the strip, except at the ends of a row. So
+                // strips overlap by two words.
                 let mut start = 0;
                 loop {
                     self.strip::<S, LANES>(start);
@@ -119,20 +120,21 @@ impl Spread<'_> {
     }
 }
 
-/// Words that are treated at once.
+/// The number of words that are treated at once.
 const LANES: usize = 8;
 
-/// A part of a slab that is treated from the lowest y to the highest: eight words of every row, or all of rows that are
-/// shorter, several at once where they fit.
+/// A part of a slab that is treated from the lowest y to the highest: eight words of each row, or several whole rows at
+/// once if they are short.
 struct Strip {
-    /// Its first word in a row.
+    /// The index in a row of the strip's first word.
     start: usize,
-    /// From words treated together to the next.
+    /// The number of words from one step to the next.
     step: usize,
-    /// Which points have a neighbour at −x and at +x, for each word.
+    /// For each word, a mask of the points that have a neighbour at −x.
     from_low: [u64; LANES],
+    /// For each word, a mask of the points that have a neighbour at +x.
     from_high: [u64; LANES],
-    /// What each word is flipped with when it comes in and when it goes out.
+    /// Applied by xor to each word that is read or written.
     flip: u64,
 }
 
@@ -156,7 +158,7 @@ impl Strip {
     fn slabs<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(&self, from: &BitGrid, out: &mut BitGrid) {
         let [_, ny, nz] = from.shape.size().map(|size| size as usize);
         let len = from.row * ny;
-        // Beyond the lowest and the highest slab, these stand for those that are missing.
+        // The lowest and the highest slab stand in for the missing ones beyond them, which changes nothing in a union.
         let slab = |z: usize| &from.words[len * z.min(nz - 1)..][..len];
         if nz == 1 {
             let mut spare = Words::zeros(len);
@@ -164,7 +166,7 @@ impl Strip {
             return;
         }
         for z in (1..nz + nz % 2).step_by(2) {
-            // Of an odd number, the last but one is made twice.
+            // With an odd number of slabs, the last but one is made twice.
             let z = z.min(nz - 1);
             let (low, high) = out.words[len * (z - 1)..][..2 * len].split_at_mut(len);
             let slabs = [slab(z.saturating_sub(2)), slab(z - 1), slab(z), slab(z + 1)];
@@ -172,8 +174,8 @@ impl Strip {
         }
     }
 
-    /// Joins the points of the two slabs in the middle with their neighbours in all four. `ROW`: how many words a row
-    /// has, or [`LANES`] where one row at once is treated.
+    /// Joins the points of the two middle slabs with their neighbours in all four. `ROW` is the number of words per
+    /// row, or [`LANES`] if one row is treated at a time.
     #[inline(always)]
     fn two_slabs<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(
         &self,
@@ -184,9 +186,9 @@ impl Strip {
         let nothing = E::load(&[0; LANES]);
         let (mut before, mut here) = ([[nothing; 2]; 2], self.load_part(slabs, self.start));
         let mut at = self.start;
-        // What is written behind the words of a step is overwritten by the next.
+        // A step may write past its own words; the next step overwrites that.
         if at == 0 {
-            // Where all that a step reads is there; it has no branches.
+            // The fast path, without branches: all that a step reads lies within the slabs.
             while let ([Some(below), Some(first), Some(second), Some(above)], Some(low), Some(high)) = (
                 slabs.map(|slab| chunk(slab, at + self.step)),
                 low.get_mut(at..).and_then(|low| low.first_chunk_mut()),
@@ -220,7 +222,7 @@ impl Strip {
         }
     }
 
-    /// [`join_slabs`] of as many words as there are from `at` on.
+    /// [`join_slabs`] of the words from `at` on, as many as the slabs have.
     #[inline(always)]
     fn load_part<E: Eight>(&self, slabs: [&[u64]; 4], at: usize) -> [[E; 2]; 2] {
         let mut words = [[self.flip; LANES]; 4];
@@ -236,7 +238,7 @@ fn chunk(slab: &[u64], at: usize) -> Option<&[u64; LANES]> {
     slab.get(at..)?.first_chunk()
 }
 
-/// For both slabs in the middle its words, and those of it, the slab below and the slab above joined.
+/// For each of the two middle slabs: its own words, and their union with the words of the slabs below and above it.
 #[inline(always)]
 fn join_slabs<E: Eight>(slabs: [&[u64; LANES]; 4], flip: E) -> [[E; 2]; 2] {
     let [below, first, second, above] = slabs;
@@ -246,7 +248,8 @@ fn join_slabs<E: Eight>(slabs: [&[u64; LANES]; 4], flip: E) -> [[E; 2]; 2] {
     [[first, both.or(below)], [second, both.or(above)]]
 }
 
-/// The words of one step, of those before it, its own and those behind it, of the slab alone and of all three joined.
+/// The joined words of one step, from the words of the step before, this step and the next: for each, those of the slab
+/// alone and those of [`join_slabs`].
 #[inline(always)]
 fn step<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(
     [before, here, behind]: [[E; 2]; 3],
@@ -266,7 +269,7 @@ fn step<E: Eight, const ROW: usize, const NEIGHBOURS: u8>(
     centre.spread(sides, from_low, from_high)
 }
 
-/// Joins the words of `centre` with those beside them along y, of the steps before, of this one and behind it.
+/// Joins the words of `centre` with their neighbours along y, from the step before, this step and the next.
 #[inline(always)]
 fn along_y<E: Eight, const ROW: usize>(centre: E, [before, here, behind]: [E; 3]) -> E {
     let [low, high] = match ROW {

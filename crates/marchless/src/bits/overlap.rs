@@ -31,21 +31,21 @@ impl BitGrid {
             .sum()
     }
 
-    /// Whether some point is set whose distance from `centre` is at most `radius`, both in points of the lattice.
+    /// True if a point is set whose distance from `centre` is at most `radius`. Both are in lattice units.
     ///
-    /// A radius that is negative or NaN and a centre that is not finite overlap nothing; an infinite radius reaches
-    /// everything. Distances are computed in `f64`: exactly where it holds their squares (as of halves below 2²⁴);
-    /// otherwise what lies on the sphere but for its rounding may count or not.
+    /// A negative or NaN radius overlaps nothing, and neither does a centre that is not finite; an infinite radius
+    /// reaches everything. Distances are computed in `f64`. They are exact if `f64` holds their squares, as for
+    /// multiples of ½ below 2²⁴. Otherwise a point that lies on the sphere, up to rounding, may count or not.
     pub fn overlaps_ball(&self, centre: [f32; 3], radius: f32) -> bool {
         if !centre.iter().all(|v| v.is_finite()) || radius.is_nan() || radius < 0.0 {
             return false;
         }
         let (centre, radius) = (centre.map(f64::from), f64::from(radius));
         let size = self.shape.size();
-        // Of an axis, the coordinates that are at most `distance` away from the centre.
+        // The coordinates along an axis that are at most `distance` away from the centre.
         let within = |axis: usize, distance: f64| {
             let (low, high) = (centre[axis] - distance, centre[axis] + distance);
-            // Conversions saturate, and round towards zero.
+            // Conversions saturate and round towards zero.
             let below = low as u32;
             let first = if f64::from(below) < low { below.saturating_add(1) } else { below };
             let behind = if high < 0.0 { 0 } else { (high as u32).saturating_add(1) };
@@ -58,8 +58,8 @@ impl BitGrid {
         })
     }
 
-    /// Whether some point is set in both grids, where the point p of `other` lies at p + `offset`. The grids may differ
-    /// in size, and lie beside each other.
+    /// True if a point is set in both grids, with point `p` of `other` at `p + offset`. The grids may differ in size,
+    /// and may lie apart.
     pub fn overlaps(&self, other: &Self, offset: [i32; 3]) -> bool {
         let [nx, ny, nz] = self.shape.size().map(i64::from);
         let [mx, my, mz] = other.shape.size().map(i64::from);
@@ -84,8 +84,8 @@ impl BitGrid {
         span_words(span).any(|(index, bits)| row[index] & bits != 0)
     }
 
-    /// The part of a region that lies in the grid: of each axis, the first and the one behind the last. Of all axes
-    /// nothing where it is empty.
+    /// The part of a region that lies in the grid: the first coordinate of each axis and the one past the last. All
+    /// zeros if that part is empty.
     fn clipped(&self, region: Region) -> [[u32; 2]; 3] {
         let size = self.shape.size();
         let clipped: [[u32; 2]; 3] = core::array::from_fn(|axis| {

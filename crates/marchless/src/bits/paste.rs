@@ -44,7 +44,8 @@ impl BitGrid {
         }
     }
 
-    /// Replaces the bits `x` of a row, which lie within the grid: `word` tells the 64 bits from a place on.
+    /// Replaces the bits of a row from `start` up to, but without, `end`, which lie within the grid. `word(x)` returns
+    /// the 64 new bits from `x` on.
     #[inline]
     fn change_row(&mut self, (start, end): (i64, i64), y: i64, z: i64, word: impl Fn(i64) -> u64) {
         let row = self.words_per_row() * (y as usize + self.shape().size()[1] as usize * z as usize);
@@ -59,8 +60,8 @@ impl BitGrid {
     }
 }
 
-/// Along each axis, where a box of that size and lowest point begins and ends in the grid; `None` where they have no
-/// point in common.
+/// The part of a box that lies in the grid: along each axis, the first coordinate and the one past the last. `None` if
+/// box and grid have no point in common.
 fn spans(grid: &BitGrid, size: [u32; 3], min: [i64; 3]) -> Option<[(i64, i64); 3]> {
     let grid = grid.shape().size();
     let span = |axis: usize| (min[axis].max(0), (min[axis] + i64::from(size[axis])).min(i64::from(grid[axis])));
@@ -72,7 +73,7 @@ fn spans(grid: &BitGrid, size: [u32; 3], min: [i64; 3]) -> Option<[(i64, i64); 3
 pub(super) fn word_at(row: &[u64], first: i64) -> u64 {
     let (index, shift) = (first.div_euclid(64), first.rem_euclid(64) as u32);
     let word = |index: i64| usize::try_from(index).ok().and_then(|index| row.get(index)).copied().unwrap_or(0);
-    // In two steps, since a shift by 64 is none.
+    // Two shifts, since one shift by 64 would overflow.
     word(index) >> shift | word(index + 1) << 1 << (63 - shift)
 }
 
@@ -87,7 +88,7 @@ mod tests {
         BitGrid::from_fn(Shape::new(size).unwrap(), |_| rng.bool()).unwrap()
     }
 
-    /// The point of a grid of `size` at `position - offset`, where there is one.
+    /// The point `position - offset` of a grid of `size`; `None` outside that grid.
     fn moved(size: [u32; 3], position: [u32; 3], offset: [i32; 3]) -> Option<[u32; 3]> {
         let mut from = [0; 3];
         for axis in 0..3 {
@@ -99,7 +100,7 @@ mod tests {
     const SIZES: [[u32; 3]; 7] = [[1, 1, 1], [31, 2, 3], [64, 3, 2], [65, 1, 4], [127, 2, 2], [130, 3, 1], [200, 2, 3]];
 
     #[test]
-    fn pasting_replaces_what_both_have() {
+    fn pasting_replaces_the_points_where_both_grids_overlap() {
         for (to, from) in SIZES.into_iter().flat_map(|to| SIZES.map(|from| (to, from))) {
             let (before, other) = (noise(to, 1), noise(from, 2));
             for x in [i32::MIN, -129, -64, -63, -1, 0, 1, 62, 64, 65, 128, i32::MAX] {

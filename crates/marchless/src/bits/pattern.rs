@@ -1,22 +1,24 @@
-//! One word for each word of a row, repeated over several rows.
+//! [`Pattern`]: the masks of one row's words, repeated over several rows.
 
 use alloc::{vec, vec::Vec};
 
-/// Words that fit without an allocation: enough for loops over them to run at full speed.
+/// The number of words that fit without an allocation: enough for loops over them to run at full speed.
 const INLINE: usize = 256;
 
-/// What the words of one row are masked with, repeated: rows of a few words are too short for a loop of their own, so
-/// that loops run over several rows as one stream of words, with this beside it.
+/// The masks of one row's words, repeated over several rows.
+///
+/// A row of a few words is too short for a loop of its own. Loops go over several rows as one stream of words instead,
+/// and over these masks beside it.
 pub(super) struct Pattern {
     inline: [u64; INLINE],
-    /// In place of `inline` where one row alone is longer.
+    /// Used instead of `inline` if one row alone is longer.
     long: Vec<u64>,
     len: usize,
 }
 
 impl Pattern {
-    /// `word` of each of the `row` words of a row, over as many rows as fit, at most `rows`, which is not 0. The first
-    /// is that of the word `start` of a row.
+    /// The pattern of rows of `row` words. `word` returns the mask of each word of a row, and the first mask is that of
+    /// word `start`. Repeats the row as often as it fits, at most `rows` times, which is not 0.
     pub(super) fn new(row: usize, rows: usize, start: usize, word: impl Fn(usize) -> u64) -> Self {
         let len = row * (INLINE / row).clamp(1, rows);
         let mut pattern = Self { inline: [0; INLINE], long: if len > INLINE { vec![0; len] } else { Vec::new() }, len };
@@ -29,7 +31,7 @@ impl Pattern {
         pattern
     }
 
-    /// The words, a multiple of a row's.
+    /// The masks: those of one or more whole rows.
     #[inline(always)]
     pub(super) fn words(&self) -> &[u64] {
         if self.len > INLINE { &self.long } else { &self.inline[..self.len] }

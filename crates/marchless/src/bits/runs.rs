@@ -1,19 +1,20 @@
-//! Runs of set bits: where they are in a row, and rows made of them.
+//! Runs of set bits: finding them in rows, and the words that a run covers.
 
 use alloc::vec::Vec;
 
 use super::{BitGrid, set_bits};
 
-/// The maximal runs of set bits of a grid's rows, in the order of memory.
+/// The maximal runs of set bits of a grid's rows, in memory order.
 #[derive(Clone, Debug)]
 pub(super) struct Runs {
-    /// The first x of each run and the x behind its last.
+    /// The first x of each run and the x past its last.
     pub(super) spans: Vec<[u32; 2]>,
-    /// For each row the number of its first run; in the end how many runs there are.
+    /// The index of each row's first run; then the number of all runs.
     pub(super) starts: Vec<usize>,
 }
 
 impl Runs {
+    /// The runs of a grid.
     pub(super) fn of(grid: &BitGrid) -> Self {
         let nx = grid.shape.size()[0];
         let mut spans = Vec::new();
@@ -22,7 +23,7 @@ impl Runs {
             starts.push(spans.len());
             let (mut open, mut start) = (0, 0);
             for (&word, base) in row.iter().zip((0..).step_by(64)) {
-                // Where a bit differs from the one before it, runs start and end by turns.
+                // A run starts or ends, in turn, at each bit that differs from the one before it.
                 for bit in set_bits(word ^ (word << 1 | open)) {
                     if word >> bit & 1 == 1 {
                         start = base + bit;
@@ -41,8 +42,8 @@ impl Runs {
     }
 }
 
-/// The words that hold the bits from `start` up to, but without, `end`: the index of each, and which of its bits are
-/// meant. None where `end` is not above `start`.
+/// The words that hold the bits from `start` up to, but without, `end`: the index of each word, and a mask of the bits
+/// in it. Nothing if `end` is not above `start`.
 pub(super) fn span_words([start, end]: [u32; 2]) -> impl Iterator<Item = (usize, u64)> {
     let (first, behind) = if start < end { (start / 64, end.div_ceil(64)) } else { (0, 0) };
     (first..behind).map(move |index| {

@@ -1,4 +1,4 @@
-//! From the signs of samples to bits.
+//! Packs the signs of samples into bits.
 
 use super::BitGrid;
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     simd::{Backend, Job, Simd, dispatch},
 };
 
-/// Samples whose signs become a grid.
+/// The job that packs the signs of samples into a grid.
 pub(super) struct SignRows<'a, W> {
     pub(super) samples: Samples<'a, W>,
     pub(super) padding: usize,
@@ -20,13 +20,13 @@ pub(super) struct SignRows<'a, W> {
 }
 
 impl<W: Weight> SignRows<'_, W> {
-    /// Packs them with `backend`.
+    /// Packs the signs with `backend`.
     pub(super) fn pack(self, backend: Backend) {
         W::call::<OnBackend>((backend, self));
     }
 }
 
-/// [`SignRows::pack`], by type of weights.
+/// [`SignRows::pack`] for each type of weight.
 struct OnBackend;
 
 impl PerWeight for OnBackend {

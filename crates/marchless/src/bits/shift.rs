@@ -1,15 +1,14 @@
 //! Shifting a whole grid.
 //!
-//! A shift along y and z moves whole rows. One along x moves words, and bits from each word into the next: it runs over
-//! the rows of a slab as over one stream of words, and a mask for each word of a row takes away what would come from
-//! another row.
+//! A shift along y or z moves whole rows. A shift along x moves words, and bits from each word into the next. It treats
+//! the rows of a slab as one stream of words; a mask for each word of a row drops the bits that come from another row.
 
 use super::{BitGrid, BitsError, pattern::Pattern};
 use crate::simd::{Backend, Job, Simd, Words, dispatch_words};
 
 impl BitGrid {
-    /// The grid with every set point moved by `offset`: point `p` of it is point `p - offset` of this one. Zeros come
-    /// in at the borders; what leaves the grid is lost.
+    /// The grid with every set point moved by `offset`: its point `p` is point `p - offset` of this grid. Zeros come in
+    /// at the borders; points that leave the grid are lost.
     ///
     /// ```
     /// use marchless::{Shape, bits::BitGrid};
@@ -43,6 +42,7 @@ impl BitGrid {
     }
 }
 
+/// A shift of one grid into another.
 struct Shift<'a> {
     from: &'a BitGrid,
     offset: [i32; 3],
@@ -77,8 +77,8 @@ impl Job for Shift<'_> {
     }
 }
 
-/// What is left of both when `steps` pieces of `piece` words move from `source` to `target`. The rest of the target
-/// becomes zero.
+/// The parts of `source` and `target` that correspond when all words move by `steps` pieces of `piece` words. The rest
+/// of `target` becomes zero.
 #[inline(always)]
 fn overlap<'a>(source: &'a [u64], target: &'a mut [u64], steps: i32, piece: usize) -> (&'a [u64], &'a mut [u64]) {
     let (words, rest) = (steps.unsigned_abs() as usize * piece, target.len() - steps.unsigned_abs() as usize * piece);
@@ -93,13 +93,14 @@ fn overlap<'a>(source: &'a [u64], target: &'a mut [u64], steps: i32, piece: usiz
     }
 }
 
-/// A shift along x by less than a row.
+/// A shift along x by less than a row: by whole words, and then by bits.
 struct AlongX {
     up: bool,
-    /// By how many words, and by how many bits more.
     words: usize,
+    /// Less than 64.
     bits: u32,
-    /// What the words of a row may get, the first being that of [`AlongX::run`]'s loop.
+    /// For each word, a mask of the bits that come from its own row. Starts with the word that [`AlongX::stream`]
+    /// writes first.
     masks: Pattern,
 }
 
@@ -148,7 +149,7 @@ impl AlongX {
         }
     }
 
-    /// Writes what `join` makes of the words of both slices, masked.
+    /// Writes `join` of each pair of words, masked.
     #[inline(always)]
     fn stream(&self, moved: &[u64], carried: &[u64], target: &mut [u64], join: impl Fn(u64, u64) -> u64) {
         let masks = self.masks.words();

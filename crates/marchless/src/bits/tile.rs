@@ -1,5 +1,7 @@
-//! 8 × 8 × 8 bits in one cache line, and grids of them: what "Marchless Cubes: Bitfield SIMD Voxel Meshing" shifts as a
-//! whole. How its case masks compare with those of rows: `case_masks.rs`.
+//! [`Tile`]: 8 × 8 × 8 bits in one cache line; and [`TileGrid`]: a grid of tiles.
+//!
+//! "Marchless Cubes: Bitfield SIMD Voxel Meshing" shifts such a tile as a whole. `case_masks.rs` compares its case
+//! masks with those made from rows.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -14,7 +16,7 @@ use crate::{
 /// The bits with x = 0.
 const LOW_X: u64 = 0x0101_0101_0101_0101;
 
-/// 8 × 8 × 8 bits, one cache line: bit `x` of byte `y` of word `z` is the point `[x, y, z]`.
+/// 8 × 8 × 8 bits in one cache line: the point `[x, y, z]` is bit `x` of byte `y` of word `z`.
 ///
 /// ```
 /// use marchless::{bits::Tile, cell::Face};
@@ -38,12 +40,12 @@ impl Tile {
         Self(words)
     }
 
-    /// One word for each z; byte `y` of it is a row along x.
+    /// The words, one for each z; byte `y` of a word is a row along x.
     pub const fn words(&self) -> &[u64; 8] {
         &self.0
     }
 
-    /// Whether the bit of a point is set; `false` outside the tile.
+    /// True if the bit of a point is set; false outside the tile.
     pub fn get(&self, position: [u32; 3]) -> bool {
         let [x, y, z] = position;
         position.iter().all(|&v| v < Self::SIZE) && self.0[z as usize] >> (x + 8 * y) & 1 == 1
@@ -52,7 +54,7 @@ impl Tile {
     /// Sets the bit of a point.
     ///
     /// # Errors
-    /// [`BitsError::OutOfRange`] where a coordinate is above 7.
+    /// [`BitsError::OutOfRange`] if a coordinate is above 7.
     pub fn set(&mut self, position: [u32; 3], value: bool) -> Result<(), BitsError> {
         const SHAPE: Shape = match Shape::cube(Tile::SIZE) {
             Ok(shape) => shape,
@@ -67,7 +69,8 @@ impl Tile {
         Ok(())
     }
 
-    /// The whole tile moved by one towards a face. What is pushed out there is lost; zeros come in on the other side.
+    /// The tile with all points moved by one towards a face. The points at that face are lost; zeros come in at the
+    /// opposite face.
     pub fn shifted(self, towards: Face) -> Self {
         let mut words = self.0;
         match (towards.axis(), towards.is_high()) {
@@ -87,17 +90,17 @@ impl Tile {
         Self(words)
     }
 
-    /// The case index of each of the cells whose first corner lies in the tile, `[8·8·8]`, x fastest: bit k is
-    /// [`Corner`](crate::cell::Corner) k. Corners beyond the tile count as zero.
+    /// The case indices of the cells whose first corner lies in the tile, `[8·8·8]`, x fastest: bit k of a cell's byte
+    /// is its [`Corner`](crate::cell::Corner) k. Corners beyond the tile count as zero.
     pub fn case_masks(&self) -> [u8; 512] {
         dispatch(Backend::fastest(), OneTile([self, &NONE, &NONE, &NONE, &NONE, &NONE, &NONE, &NONE]))
     }
 }
 
-/// What lies beyond the last tiles.
+/// An empty tile: the neighbour of the last tiles.
 static NONE: Tile = Tile([0; 8]);
 
-/// A grid of any size cut into [tiles](Tile). Bits of the last tiles that are no points are zero.
+/// A grid of any size, cut into [tiles](Tile). The bits of the last tiles that lie beyond the grid are zero.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TileGrid {
     shape: Shape,
@@ -153,30 +156,30 @@ impl TileGrid {
         &self.tiles
     }
 
-    /// Tiles per axis, the last of which may be filled in part.
+    /// The number of tiles per axis. The last one of an axis may be filled in part.
     pub fn tiles_per_axis(&self) -> [u32; 3] {
         per_axis(self.shape).map(|count| count as u32)
     }
 
-    /// The tile whose first point is `8·position`, if there is one.
+    /// The tile whose first point is `8·position`; `None` outside the grid.
     pub fn tile(&self, position: [u32; 3]) -> Option<&Tile> {
         let ([nx, ny, nz], [x, y, z]) = (per_axis(self.shape), position.map(|v| v as usize));
         (x < nx && y < ny && z < nz).then(|| &self.tiles[x + nx * (y + ny * z)])
     }
 
-    /// The case index of each of the cells whose first corner lies in this tile, `[8·8·8]`, x fastest: bit k is
-    /// [`Corner`](crate::cell::Corner) k, which may lie in one of the tiles behind it. Corners beyond the grid count as
-    /// zero. `None` where there is no such tile.
+    /// The case indices of the cells whose first corner lies in a tile, `[8·8·8]`, x fastest: bit k of a cell's byte is
+    /// its [`Corner`](crate::cell::Corner) k, which may lie in a neighbouring tile. Corners beyond the grid count as
+    /// zero. `None` if there is no such tile.
     pub fn case_masks(&self, position: [u32; 3]) -> Option<[u8; 512]> {
         self.tile(position)?;
         Some(dispatch(Backend::fastest(), OneTile(self.around(position))))
     }
 
-    /// The [case masks](Self::case_masks) of all tiles, one tile after the other, `[512·tiles]`, into a vector whose
-    /// memory is used again. What was in it goes.
+    /// Writes the [case masks](Self::case_masks) of all tiles, one tile after another, `[512·tiles]`, to a vector,
+    /// whose content is replaced and whose memory is reused.
     ///
     /// # Errors
-    /// [`BitsError::TooLarge`] where memory does not hold them; the vector stays as it was.
+    /// [`BitsError::TooLarge`] if memory cannot hold them; the vector is then unchanged.
     pub fn case_masks_into(&self, masks: &mut Vec<u8>) -> Result<(), BitsError> {
         let too_large = BitsError::TooLarge { shape: self.shape };
         let len = self.tiles.len().checked_mul(512).ok_or(too_large)?;
@@ -185,7 +188,7 @@ impl TileGrid {
         Ok(())
     }
 
-    /// The tile at `position` and those behind it, as a cell's corners are numbered.
+    /// The tile at `position` and its neighbours at +x, +y and +z, in the order of a cell's corners.
     #[inline(always)]
     fn around(&self, [x, y, z]: [u32; 3]) -> [&Tile; 8] {
         core::array::from_fn(|corner| {
@@ -200,7 +203,7 @@ fn per_axis(shape: Shape) -> [usize; 3] {
     shape.size().map(|size| size.div_ceil(Tile::SIZE) as usize)
 }
 
-/// The tiles that a row of points goes through, its word there, and how far up in that.
+/// Where a row of points lies: the range of its tiles, its word in each of them, and its lowest bit in that word.
 fn place_of_row(shape: Shape, number: usize) -> (Range<usize>, usize, usize) {
     let ([nx, ny, _], points_y) = (per_axis(shape), shape.size()[1] as usize);
     let (y, z) = (number % points_y, number / points_y);
@@ -208,7 +211,7 @@ fn place_of_row(shape: Shape, number: usize) -> (Range<usize>, usize, usize) {
     (first..first + nx, z % 8, 8 * (y % 8))
 }
 
-/// The masks of the first of these tiles; the others lie behind it.
+/// The masks of the first of these tiles. The others are its neighbours, in the order of a cell's corners.
 struct OneTile<'a>([&'a Tile; 8]);
 
 impl Job for OneTile<'_> {
@@ -241,7 +244,7 @@ impl Job for AllTiles<'_> {
     }
 }
 
-/// The eight shifted copies, two layers along z at a time, and their bits spread into bytes.
+/// Makes the eight shifted copies, two layers along z at a time, and spreads their bits into bytes.
 #[inline(always)]
 fn tile_masks<S: Simd>(tiles: [&Tile; 8], masks: &mut [u8; 512]) {
     let [below @ .., a, b, c, d] = tiles;
@@ -255,8 +258,8 @@ fn tile_masks<S: Simd>(tiles: [&Tile; 8], masks: &mut [u8; 512]) {
     }
 }
 
-/// A layer of a tile as it is, moved down by one along x, along y, and along both, given the same layer of the tiles
-/// behind it along these.
+/// Four copies of a tile's layer: unchanged, and moved down by one along x, along y and along both. The bits that come
+/// in are from the same layer of the neighbouring tiles at +x, at +y and at both.
 #[inline(always)]
 fn layer([here, behind_x, behind_y, behind_both]: [u64; 4]) -> [u64; 4] {
     let along_x = |word: u64, behind: u64| word >> 1 & !(LOW_X << 7) | (behind & LOW_X) << 7;

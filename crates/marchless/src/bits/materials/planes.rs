@@ -1,14 +1,15 @@
-//! From bytes to planes of bits.
+//! Splits materials, one byte per point, into planes of bits.
 
 use crate::{
     bits::BitGrid,
     simd::{Job, Simd},
 };
 
-/// Materials that become planes, all of one shape.
+/// The job that writes materials to planes.
 pub(super) struct FillPlanes<'a> {
-    /// As many as the planes have points.
+    /// One for each point of a plane.
     pub(super) materials: &'a [u8],
+    /// All of one shape.
     pub(super) planes: &'a mut [BitGrid],
 }
 
@@ -36,7 +37,7 @@ impl Job for FillPlanes<'_> {
 fn bits<S: Simd>(bytes: &[u8; 64], k: usize) -> u64 {
     let mut word = 0;
     for (half, bytes) in bytes.as_chunks::<32>().0.iter().enumerate() {
-        // Where it is the sign; what comes over from the byte below stays below that.
+        // The shift makes the bit its byte's sign. Bits that come over from the byte below stay below the sign.
         let mut signs = [0; 32];
         for (signs, &eight) in signs.as_chunks_mut::<8>().0.iter_mut().zip(bytes.as_chunks::<8>().0) {
             let shifted = (u64::from_le_bytes(eight) << (7 - k)).to_le_bytes();

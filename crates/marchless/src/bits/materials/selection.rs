@@ -1,5 +1,5 @@
-//! Which points have one of a set of materials: a decision diagram over the planes, evaluated a block of words at a
-//! time.
+//! Selects the points that have one of a set of materials, by a decision diagram over the planes. The diagram is
+//! evaluated for a block of words at a time.
 
 use alloc::{vec, vec::Vec};
 
@@ -8,7 +8,7 @@ use crate::{
     simd::{Job, Simd},
 };
 
-/// Some of the 256 materials, a bit each.
+/// A set of materials, with a bit for each of the 256.
 #[derive(Default)]
 pub(super) struct MaterialSet([u128; 2]);
 
@@ -28,13 +28,14 @@ impl MaterialSet {
     }
 }
 
-/// Words that are made at once; all nodes of them stay in the cache.
+/// The number of words that are made at once. The words of all nodes then stay in the cache.
 const BLOCK: usize = 32;
-/// The slot of what is always zero, and that of what is always one.
+/// The slot of zeros.
 const ZEROS: usize = 0;
+/// The slot of ones.
 const ONES: usize = 1;
 
-/// A choice between the words of two slots by those of a plane.
+/// A node of the diagram: each bit of a plane chooses between the bits of two slots.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Node {
     plane: usize,
@@ -42,17 +43,18 @@ struct Node {
     where_one: usize,
 }
 
-/// The words of a set of materials, to be made.
+/// The job that selects the points of a set of materials.
 pub(super) struct Selection<'a> {
-    /// Slot `2 + k` is what node `k` gives; it refers to slots before it. No two nodes are equal.
+    /// Node `k` fills slot `2 + k` and refers to earlier slots only. No two nodes are equal.
     nodes: Vec<Node>,
+    /// The slot of the selected points.
     result: usize,
     planes: &'a [BitGrid],
     out: &'a mut [u64],
 }
 
 impl<'a> Selection<'a> {
-    /// `out`: as many words as each plane has. What it leaves in the unused bits of rows means nothing.
+    /// `out` has as many words as each plane. The unused bits of its rows are arbitrary afterwards.
     pub(super) fn new(set: &MaterialSet, planes: &'a [BitGrid], out: &'a mut [u64]) -> Self {
         let mut nodes = Vec::new();
         let result = slot_of(set, 0, planes.len(), &mut nodes);
@@ -60,8 +62,8 @@ impl<'a> Selection<'a> {
     }
 }
 
-/// The slot of those among the `2^planes` materials from `first` on that are in the set, as the lowest `planes` planes
-/// tell them apart.
+/// The slot that selects the materials of the set among the `2^planes` materials from `first` on. The lowest `planes`
+/// planes tell these materials apart. Adds the nodes that are missing.
 fn slot_of(set: &MaterialSet, first: usize, planes: usize, nodes: &mut Vec<Node>) -> usize {
     let Some(plane) = planes.checked_sub(1) else {
         return if set.contains(first) { ONES } else { ZEROS };

@@ -1,27 +1,32 @@
 //! Moves vertices from the middle of their edges to where a function is zero.
 //!
-//! Zeros are found as by Tirupathi R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding the zero of
-//! a nonlinear function without using derivatives" (1997), but from the zero of the secant on, not from the middle.
+//! Zeros are found by the method of Tirupathi R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding
+//! the zero of a nonlinear function without using derivatives" (1997), but it starts at the zero of the secant, not in
+//! the middle.
 //!
-//! Refused, after trials with six evaluations between the ends on distances of spheres, sums of waves, kinks, powers
-//! and exponentials: regula falsi with the Illinois step or that of Anderson and Björck (the worst off by a third of an
-//! edge and more; here by an eighth), ITP and Ridders' method (always take all six; here, spheres of 5 to 25 cells take
-//! 2.5, and the worst in a hundred of spheres and waves come out closer).
+//! Other methods were tried with six evaluations between the ends, on distances of spheres, sums of waves, kinks,
+//! powers and exponentials, and refused:
+//!
+//! - Regula falsi with the Illinois step, or with that of Anderson and Björck: the worst error is a third of an edge
+//!   and more. Here it is an eighth.
+//! - ITP and Ridders' method: they always take all six evaluations. Here, spheres of 5 to 25 cells take 2.5. Here, too,
+//!   the worst in a hundred are closer, on spheres and on waves.
 
 use core::mem;
 
 use crate::{bits::BitGrid, buffer::MeshBuffer, math::sqrt_f64, mesher::snapped};
 
-/// Evaluations a vertex, besides those at both ends of its edge.
+/// The most evaluations per vertex, besides those at both ends of its edge.
 const STEPS: usize = 6;
-/// A step shorter than what positions tell apart is the last: this part of the coordinate, and of 8 where it is less.
+/// The search ends at a step below this part of the coordinate, or of 8 if that is more: positions cannot resolve less.
 const TOLERANCE: f64 = 1.0 / (1 << 23) as f64;
-/// How far from a vertex, in cells, its gradient is taken; a power of two, so that coordinates are exact.
+/// The distance from a vertex, in cells, at which its gradient is sampled; a power of two, so that coordinates are
+/// exact.
 const REACH: f32 = 1.0 / 8.0;
 
-/// Places the vertices of a mesh that was just made of `bits`, all of them in the middle of edges.
+/// Moves the vertices of a mesh just made of `bits`, all of them in the middle of edges, to the zeros of `distance`.
 ///
-/// Not generic, so that it is compiled in this crate, with its level of optimisation.
+/// It is not generic, so that it is compiled in this crate, at this crate's optimisation level.
 pub(super) fn place(bits: &BitGrid, distance: &dyn Fn([f32; 3]) -> f32, out: &mut MeshBuffer) {
     let mut normals = out.normals.iter_mut();
     for position in &mut out.positions {
@@ -38,31 +43,32 @@ pub(super) fn place(bits: &BitGrid, distance: &dyn Fn([f32; 3]) -> f32, out: &mu
     out.bounds = bounds(&out.positions);
 }
 
-/// An edge with one end set.
+/// A lattice edge with one end set and the other unset.
 struct CrossedEdge {
     /// The end with the lower coordinates.
     low: [u32; 3],
     axis: usize,
-    /// Whether the low end is the one that is set.
+    /// True if the low end is the set one.
     low_is_set: bool,
 }
 
 impl CrossedEdge {
-    /// The edge that has its middle here; `None` where coordinates are too large for `f32` to tell.
+    /// The edge with this middle; `None` if the coordinates are too large for `f32` to hold a half.
     fn at(bits: &BitGrid, middle: [f32; 3]) -> Option<Self> {
         let low = middle.map(|v| v as u32);
         let axis = (0..3).find(|&axis| low[axis] as f32 != middle[axis])?;
         Some(Self { low, axis, low_is_set: bits.get(low) })
     }
 
+    /// The position at a fraction of the way from the low end to the high end.
     fn at_fraction(&self, fraction: f32) -> [f32; 3] {
         let mut position = self.low.map(|v| v as f32);
         position[self.axis] += fraction;
         position
     }
 
-    /// How far along the edge the function is zero, snapped; `None` where its signs at the ends are not the bits', or
-    /// one of its values is not finite.
+    /// The fraction of the edge where the function is zero, snapped; `None` if its signs at the ends are not those of
+    /// the bits, or if a value is not finite.
     fn zero_of(&self, distance: &dyn Fn([f32; 3]) -> f32) -> Option<f32> {
         let value_at = |fraction: f64| {
             let value = distance(self.at_fraction(fraction as f32));
@@ -73,7 +79,7 @@ impl CrossedEdge {
         if !is_like_low(low.1) || is_like_low(high.1) {
             return None;
         }
-        // The zero lies between these two, of which the first is the newer one.
+        // The zero lies between these two points, each with its value.
         let (mut newest, mut other) = (low, high);
         let tolerance = TOLERANCE * f64::from(self.low[self.axis].max(8));
         let (mut step, mut last) = (newest.1 / (newest.1 - other.1), f64::NAN);
@@ -93,12 +99,13 @@ impl CrossedEdge {
     }
 }
 
-/// Which part of the way from the newest point to the other end of the bracket to go next: by the parabola through
-/// three points, each with its value, where its values tell their places apart all the way; otherwise, one half.
+/// The next step, as a fraction of the way from the newest point to the other end of the bracket: by inverse quadratic
+/// interpolation through three points where Chandrupatla's criterion allows it, otherwise one half. Each point comes
+/// with its value.
 fn next_step(newest: (f64, f64), other: (f64, f64), older: (f64, f64)) -> f64 {
     let ((a, at_a), (b, at_b), (c, at_c)) = (newest, other, older);
     let (place, value) = ((a - b) / (c - b), (at_a - at_b) / (at_c - at_b));
-    // Not so where something is NaN.
+    // False if a number is NaN.
     if value * value < place && (1.0 - value) * (1.0 - value) < 1.0 - place {
         let from_b = at_a / (at_b - at_a) * (at_c / (at_b - at_c));
         let from_c = (c - a) / (b - a) * (at_a / (at_c - at_a)) * (at_b / (at_c - at_b));
@@ -110,7 +117,7 @@ fn next_step(newest: (f64, f64), other: (f64, f64), older: (f64, f64)) -> f64 {
     0.5
 }
 
-/// The unit vector along the function's gradient; `None` where that is zero or not finite.
+/// The unit vector along the function's gradient; `None` if the gradient is zero or not finite.
 fn direction_of_gradient(distance: &dyn Fn([f32; 3]) -> f32, position: [f32; 3]) -> Option<[f32; 3]> {
     let difference = |axis: usize| {
         let value = |offset: f32| {
@@ -120,7 +127,7 @@ fn direction_of_gradient(distance: &dyn Fn([f32; 3]) -> f32, position: [f32; 3])
         };
         value(REACH) - value(-REACH)
     };
-    // Values of `f32` have squares in `f64`, all of them.
+    // The squares neither overflow nor vanish: they are of differences of `f32` values, computed in `f64`.
     let [x, y, z] = [difference(0), difference(1), difference(2)];
     let length = sqrt_f64(x * x + y * y + z * z);
     (length > 0.0 && length < f64::INFINITY).then(|| [x, y, z].map(|v| (v / length) as f32))
