@@ -267,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shapes_refuse_what_cannot_be_addressed() {
+    fn shapes_beyond_addressable_memory_are_refused() {
         assert_eq!(Shape::new([3, 0, 2]), Err(ShapeError::Empty { size: [3, 0, 2] }));
         assert_eq!(Shape::cube(u32::MAX), Err(ShapeError::TooLarge { size: [u32::MAX; 3] }));
         let shape = Shape::new([3, 4, 5]).unwrap();
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_say_what_was_expected() {
+    fn errors_of_samples_name_the_expected_length() {
         let shape = Shape::cube(2).unwrap();
         let error = Samples::new(shape, &[0i16; 7]).unwrap_err();
         assert_eq!(error, SamplesError::WeightsLength { shape, expected: 8, found: 7 });

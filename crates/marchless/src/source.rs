@@ -166,7 +166,7 @@ mod tests {
     const REGION: SourceRegion = SourceRegion { min: [-2, 5, 0], size: [3, 2, 4], level: 1, spacing: 0.5 };
 
     #[test]
-    fn closures_are_asked_in_world_units_and_answer_in_voxels() {
+    fn closures_take_world_units_and_return_voxels() {
         let source = |[x, y, z]: [f64; 3]| x + 10.0 * y + 100.0 * z;
         let mut distances = vec![0.0; REGION.len()];
         let mut materials = vec![0; REGION.len()];

@@ -10,14 +10,15 @@ use fastrand::Rng;
 use marchless::{Block, Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
 
 thread_local! {
-    /// How often this thread has allocated, and how many bytes; the test harness has threads of its own.
+    /// The number of allocations by this thread. Counted per thread, since the test harness has threads of its own.
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+    /// The number of bytes allocated by this thread.
     static BYTES: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
 
-// SAFETY: everything is handed to the system's allocator as it is.
+// SAFETY: all calls go to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
@@ -113,7 +114,7 @@ fn warm_meshing_of_a_chunk_allocates_nothing() {
     assert_eq!(allocations(&mut mesh), 0);
 }
 
-/// Beside the samples and the mesh, a mesher keeps the signs of three slabs and what one batch of vertices is made of.
+/// Besides the samples and the mesh, a mesher keeps the signs of three slabs and the data of one batch of vertices.
 #[test]
 fn large_volumes_need_little_scratch_memory() {
     let shape = Shape::cube(256).expect("the size is small");

@@ -140,7 +140,7 @@ mod tests {
         BitGrid::from_fn(Shape::new(size).expect("no size is 0"), |_| rng.bool()).expect("it is small")
     }
 
-    /// Corner by corner.
+    /// The case masks, corner by corner.
     fn plain(grid: &BitGrid) -> Vec<u8> {
         let [nx, ny, nz] = grid.shape().size();
         let cells = (0..nz - 1).flat_map(|z| (0..ny - 1).flat_map(move |y| (0..nx - 1).map(move |x| [x, y, z])));
@@ -166,9 +166,9 @@ mod tests {
         }
     }
 
-    /// All cases, each beside every other one.
+    /// All cases, at all places of a block and beside different neighbours.
     #[test]
-    fn a_byte_for_each_of_64_columns() {
+    fn case_bytes_transposes_64_cells() {
         struct Bytes([u64; 8]);
         impl Job for Bytes {
             type Output = [u8; 64];

@@ -143,7 +143,7 @@ fn difference(before: &[Voxel], after: &[Voxel], within: Region) -> Region {
 
 proptest! {
     #[test]
-    fn edits_are_what_their_definition_says(seed: u64, bounded: bool, stamps in prop::collection::vec(stamp(), 1..4)) {
+    fn edits_follow_the_definition_of_stamps(seed: u64, bounded: bool, stamps in prop::collection::vec(stamp(), 1..4)) {
         let mut grid = grid(seed, bounded);
         for stamp in &stamps {
             let before = read(&grid);
@@ -190,10 +190,10 @@ proptest! {
     }
 
     #[test]
-    fn a_stamp_is_at_home_at_any_isovalue(
+    fn stamps_work_alike_at_any_isovalue(
         seed: u64, isovalue in -700i16..700, stamp in stamp(), voxels in -2.0..2.0f32, weight: i16,
     ) {
-        // Raising all weights and the isovalue by one amount raises the result by that amount.
+        // If all weights and the isovalue rise by one amount, the result rises by that amount.
         let (mut low, mut high) = (grid(seed, false), grid(seed, false));
         for point in all_points() {
             let Voxel { weight, material } = low.get(point);
@@ -212,7 +212,7 @@ proptest! {
     }
 
     #[test]
-    fn chunks_may_take_their_stamps_in_their_own_time(
+    fn stamping_chunk_by_chunk_equals_stamping_the_grid(
         seed: u64,
         bounded: bool,
         stamps in prop::collection::vec(stamp(), 1..5),
@@ -241,7 +241,7 @@ proptest! {
     }
 
     #[test]
-    fn strokes_do_not_depend_on_how_time_is_cut(
+    fn a_stroke_in_parts_equals_the_whole_stroke(
         seed: u64,
         bounded: bool,
         shape in small_shape(),
@@ -264,7 +264,7 @@ proptest! {
     }
 
     #[test]
-    fn eight_voxels_of_change_turn_everything(seed: u64, shape in small_shape()) {
+    fn a_change_of_eight_voxels_turns_every_sample_inside(seed: u64, shape in small_shape()) {
         let mut grid = grid(seed, false);
         let stroke = QuantisedStroke { id: 1, rate: 8 * 256, falloff: 0, start_us: 0, end_us: 1_000_000 };
         let inside = all_points().filter(|point| shape.distance(*point) < 0).collect::<Vec<_>>();
@@ -278,7 +278,7 @@ proptest! {
     }
 
     #[test]
-    fn extreme_stamps_do_no_harm(
+    fn extreme_stamps_do_not_panic(
         shape in any_shape(),
         operation in operation(),
         stroke in prop::option::of((
@@ -307,7 +307,7 @@ proptest! {
 }
 
 #[test]
-fn uniform_chunks_stay_uniform_where_they_can() {
+fn uniform_chunks_stay_uniform_if_a_stamp_changes_all_or_no_samples() {
     let solid = GridChunk::Uniform(Voxel::new(i16::MIN, 3));
     let everything = QuantisedShape::sphere([4.0; 3], 100.0).unwrap();
     let dig = QuantisedStamp::new(everything, Operation::Dig, 0);
@@ -348,7 +348,7 @@ fn samples_are_shared_until_one_changes() {
 }
 
 #[test]
-fn a_dug_ball_is_as_large_as_a_ball() {
+fn digging_a_ball_removes_exactly_its_points() {
     let mut grid = Grid::<i16>::new(32).unwrap();
     for position in Region::new([-1; 3], [1; 3]).points() {
         grid.insert(position, GridChunk::Uniform(Voxel::new(i16::MIN, 2))).unwrap();

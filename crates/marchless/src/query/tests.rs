@@ -15,7 +15,7 @@ use crate::{
 const CELLS: u32 = 8;
 const BOUNDS: Region = Region::new([-1, -1, 0], [2, 1, 2]);
 
-/// A grid with balls added and dug, and some noise.
+/// A grid with balls added and dug out, and some noise.
 fn grid(seed: u64, bounded: bool) -> Grid<i16> {
     let mut grid = if bounded { Grid::bounded(CELLS, BOUNDS) } else { Grid::new(CELLS) }.unwrap();
     let mut rng = fastrand::Rng::with_seed(seed);
@@ -67,8 +67,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The nearest triangle, its distance and the shares of its corners; `margin` is how far inside its edges the hit must
-/// be.
+/// The distance of the nearest hit, its triangle and the barycentric weights of the corners. A hit must be at least
+/// `margin` inside the triangle's edges.
 fn brute_force(
     triangles: &[Triangle],
     origin: [f64; 3],
@@ -123,7 +123,7 @@ proptest! {
         let mut hits = 0;
         for (number, (&(origin, mut direction, max_distance), target)) in rays.iter().zip(&targets).enumerate() {
             if number % 3 == 0 {
-                // Towards a point within a triangle, so that there is something to hit.
+                // Every third ray points into a triangle, so that enough rays hit something.
                 let [a, b, c] = triangles[target.index(triangles.len())].corners;
                 direction = minus([0, 1, 2].map(|i| a[i] * 0.5 + b[i] * 0.3 + c[i] * 0.2), origin);
             }
@@ -165,7 +165,7 @@ proptest! {
     }
 
     #[test]
-    fn no_walk_is_longer_than_was_said(
+    fn the_estimate_of_steps_bounds_every_walk(
         origin in prop::array::uniform3(-300.0f64..300.0), direction in direction(), length in 0.0f64..500.0,
     ) {
         if let Some(ray) = Ray::new(origin, direction, length) {
@@ -176,7 +176,7 @@ proptest! {
     }
 
     #[test]
-    fn no_ray_does_harm(
+    fn hits_of_extreme_rays_are_valid(
         seed: u64,
         bounded: bool,
         origin in prop::array::uniform3(prop_oneof![any::<f64>(), -10.0f64..10.0, Just(-8.0), Just(f64::MAX)]),
@@ -208,9 +208,9 @@ proptest! {
     }
 }
 
-/// From there, all planes are reached at the same distance: a walk past all of them would not end in this life.
+/// So far away, rounding gives all planes of chunks the same distance. A walk that does not advance would never end.
 #[test]
-fn rays_from_beyond_all_precision_come_to_an_end() {
+fn rays_from_beyond_f64_precision_end() {
     for far in [1e18, 1e40, 1e300] {
         let origin = [far, 0.5, 0.5];
         assert!(
@@ -237,7 +237,7 @@ fn both_sides_are_hit_and_the_normal_points_out() {
 }
 
 #[test]
-fn what_is_no_ray_hits_nothing() {
+fn invalid_rays_hit_nothing() {
     let grid = grid(1, true);
     let cast = |origin, direction, length| grid.ray_cast(0.0, origin, direction, length);
     assert!(cast([4.0, 4.0, 40.0], [0.0, 0.0, -1.0], 100.0).is_some());
@@ -252,7 +252,7 @@ fn what_is_no_ray_hits_nothing() {
 }
 
 #[test]
-fn chunks_far_apart_are_not_walked_between() {
+fn rays_skip_the_space_between_distant_chunks() {
     let mut grid = Grid::<i16>::new(8).unwrap();
     let far = [(1 << 27) - 100, -1000, 7];
     let ball = |center: [i32; 3], material| {
@@ -267,7 +267,7 @@ fn chunks_far_apart_are_not_walked_between() {
     assert_eq!((hit.material, hit.chunk), (1, [0, 0, 0]));
     let hit = cast([x + 0.4, y + 0.3, z - 50.0], [0.0, 0.0, 1.0]).expect("the far ball is in the way");
     assert!(hit.material == 2 && (hit.distance - 44.0).abs() < 0.2, "{hit:?}");
-    // From the one to the other: the nearer one comes first, whichever it is.
+    // A ray along the line through both balls hits the one in front of it.
     assert_eq!(cast([50.0, 0.0, 0.0], [-x, -y, -z]).map(|hit| hit.material), Some(1));
     assert_eq!(cast([100.0, 0.0, 0.0], [x - 100.0, y, z]).map(|hit| hit.material), Some(2));
     assert_eq!(cast([-50.0, 0.0, 0.0], [x + 50.0, y, z]).map(|hit| hit.material), Some(1));
@@ -286,7 +286,7 @@ fn weights_are_finite_whatever_the_samples_are() {
     assert!(grid.weight_at(0.0, [0.0; 3]).is_some_and(|weight| weight < 0.0));
 }
 
-/// The nearest hit in all chunks that have a mesh, gone through one by one.
+/// The nearest hit by brute force: all chunks that have a mesh are tried.
 fn nearest_of_all(
     grid: &Grid<i16>,
     isovalue: f32,
@@ -303,7 +303,7 @@ fn nearest_of_all(
     hits.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
-/// A grid of few chunks, some side by side, some at the two ends of the lattice.
+/// A grid of a few chunks: some side by side, some at both ends of the lattice.
 fn sparse_grid() -> impl Strategy<Value = Grid<i16>> {
     let end = Grid::<i16>::largest(CELLS).max[0];
     let coordinate = move || prop_oneof![6 => -3..3i32, 2 => -70..70i32, 1 => -100_000..100_000i32, 1 => Just(end - 2), 1 => Just(-end)];
@@ -391,7 +391,7 @@ fn walks_are_short_whatever_the_grid_holds() {
         for position in region.points() {
             grid.insert_clean(position, GridChunk::AIR).unwrap();
         }
-        // Down, along a slope, past all, and from one end of the lattice to the other.
+        // Rays down, along a slope, past all chunks, and from one end of the lattice to the other.
         let middle = ends[1].map(|v| f64::from(v) * 8.0);
         let rays = [
             ([3.3, 400.0, 5.7], [0.0, -1.0, 0.0]),
@@ -410,7 +410,7 @@ fn walks_are_short_whatever_the_grid_holds() {
     assert!(one.iter().all(|&(passed, chunks)| passed <= 24 && chunks <= 4), "{one:?}");
     let few = load(Region::new([-32, 0, -32], [32, 1, 32]));
     assert!(few.iter().all(|&(passed, chunks)| passed <= 120 && chunks <= 32), "{few:?}");
-    // Twelve times the chunks: more only where the ray runs along them.
+    // With twelve times as many chunks, only rays along them pass more boxes.
     let many = load(Region::new([-64, -2, -64], [64, 1, 64]));
     assert!(many.iter().all(|&(passed, chunks)| passed <= 160 && chunks <= 64), "{many:?}");
     assert_eq!(many[..2].iter().map(|ray| ray.0).max(), few[..2].iter().map(|ray| ray.0).max());

@@ -1,4 +1,4 @@
-//! For each kind of defect, a mesh with this defect alone.
+//! A mesh for each kind of defect, with this defect alone.
 
 mod plain;
 mod threads;
@@ -17,7 +17,7 @@ fn tetrahedron() -> Mesh {
     (corners, vec![0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3])
 }
 
-/// A unit cube with its lowest corner at `origin`; corner `i` at the bits of `i`.
+/// A unit cube with its lowest corner at `origin`; the bits of `i` are the coordinates of corner `i`.
 fn cube(origin: [f32; 3]) -> Mesh {
     let corner = |i: usize| core::array::from_fn(|axis| origin[axis] + (i >> axis & 1) as f32);
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
@@ -25,7 +25,7 @@ fn cube(origin: [f32; 3]) -> Mesh {
     ((0..8).map(corner).collect(), indices)
 }
 
-/// A grid of `n` × `m` quads that closes on itself both ways.
+/// A torus of `n` × `m` quads.
 fn torus(n: u32, m: u32) -> Mesh {
     let at = |i: u32, j: u32| (j % m) * n + i % n;
     let positions = (0..n * m)
@@ -41,7 +41,7 @@ fn torus(n: u32, m: u32) -> Mesh {
     (positions, indices)
 }
 
-/// Both meshes in one, with vertices of the second replaced where `shared` says (second's, first's).
+/// Both meshes in one. `shared` lists the second's vertices that are replaced, each with the first's vertex.
 fn joined(first: &Mesh, second: &Mesh, shared: &[(u32, u32)]) -> Mesh {
     let (mut positions, mut indices) = first.clone();
     let mut names = vec![0; second.0.len()];
@@ -209,12 +209,12 @@ fn strip(n: u32, twisted: bool) -> Mesh {
     (positions.collect(), (0..n).flat_map(quad).collect())
 }
 
-/// Two surfaces sewn together along a triangle that both lose: the first of the first, the last of the second.
+/// Two surfaces sewn together along a triangle that both lose: the first one of `first`, the last one of `second`.
 fn sewn(first: &Mesh, second: &Mesh) -> Mesh {
     let (mut first, mut second) = (first.clone(), second.clone());
     let rest = second.1.split_off(second.1.len() - 3);
     let rim: Vec<u32> = first.1.drain(..3).collect();
-    // The other way round.
+    // The second rim runs the other way round.
     joined(&first, &second, &[(rest[0], rim[0]), (rest[1], rim[2]), (rest[2], rim[1])])
 }
 
@@ -248,7 +248,7 @@ fn genus_counts_handles() {
     }
 }
 
-/// The mesh has these defects and no others.
+/// Checks that the mesh has these defects and no others.
 #[track_caller]
 fn has_only(report: &MeshReport, defects: &[(usize, &str)]) {
     let found: Vec<_> =

@@ -1,5 +1,4 @@
-//! However a mesh is made, it is the same mesh, byte for byte: on every backend, slab by slab, and on any number of
-//! threads.
+//! The mesh is the same, byte for byte, on every backend, slab by slab, and on any number of threads.
 
 #[cfg(feature = "std")]
 use std::num::NonZero;
@@ -11,7 +10,7 @@ use proptest::prelude::*;
 
 use crate::support::{Field, TestWeight};
 
-/// A mesh down to the last bit, signs of zeros and all.
+/// A mesh down to the last bit, including the signs of zeros.
 #[derive(Debug, PartialEq)]
 struct Bits {
     positions: Vec<[u32; 3]>,
@@ -38,7 +37,7 @@ fn meshed<W: TestWeight>(mut mesher: Mesher, samples: Samples<'_, W>, settings: 
     bits(&mesh)
 }
 
-/// Slab by slab; what comes out is taken away after some of them.
+/// The mesh made slab by slab. The output is moved out of the buffer after every `taken_every` slabs.
 fn streamed<W: TestWeight>(samples: Samples<'_, W>, settings: &MeshSettings, taken_every: usize) -> Bits {
     let [nx, ny, _] = samples.shape().size();
     let mut mesher = SlabMesher::new([nx, ny], *settings).expect("the slabs have cells");
@@ -65,7 +64,7 @@ fn streamed<W: TestWeight>(samples: Samples<'_, W>, settings: &MeshSettings, tak
     bits(&whole)
 }
 
-/// `exact`: whether open cells are decided.
+/// Checks a field with the trilinear topology if `exact`, otherwise with the separated one.
 fn check<W: TestWeight>(field: &Field<W>, normals: bool, exact: bool, taken_every: usize) -> Result<(), TestCaseError> {
     let topology = if exact { Topology::Trilinear } else { Topology::Separated };
     let settings = MeshSettings { isovalue: field.isovalue, normals, topology };
@@ -78,7 +77,7 @@ fn check<W: TestWeight>(field: &Field<W>, normals: bool, exact: bool, taken_ever
     for threads in 1..=3 {
         let mut mesh = MeshBuffer::new();
         let mut mesher = ThreadedMesher::new(NonZero::new(threads).expect("there is a thread"));
-        // A mesher and a buffer that have seen other samples must not remember them.
+        // A mesher and a buffer must not remember earlier samples.
         let turned_over = MeshSettings { isovalue: -field.isovalue, ..settings };
         mesher.mesh(Samples::new(field.shape, &field.weights)?, &turned_over, &mut mesh)?;
         mesher.mesh(field.samples(), &settings, &mut mesh)?;
@@ -108,8 +107,7 @@ proptest! {
     }
 }
 
-/// Every way in which 8 samples, three times behind one another, can lie: all cases of a cell beside all of its
-/// neighbour.
+/// All signs of 3 × 2 × 2 samples: every case of a cell, beside every case of its neighbour that fits.
 #[test]
 fn all_pairs_of_cases_are_the_same() {
     let shape = Shape::new([3, 2, 2]).expect("the size is small");
@@ -128,7 +126,7 @@ fn all_pairs_of_cases_are_the_same() {
 }
 
 #[test]
-fn machines_without_a_backend_do_without() {
+fn unavailable_backends_fall_back_to_others() {
     let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
     let samples = Samples::new(Shape::cube(2).expect("the size is small"), &weights).expect("one weight a sample");
     let plain = meshed(Mesher::with_backend(Backend::Portable), samples, &MeshSettings::default());
@@ -161,7 +159,7 @@ fn processor_has(name: &str) -> bool {
 
 #[cfg(feature = "std")]
 #[test]
-fn threads_refuse_what_one_refuses() {
+fn threads_return_the_errors_of_a_single_thread() {
     let mut mesher = ThreadedMesher::new(NonZero::new(2).expect("two are some"));
     let mut mesh = MeshBuffer { positions: vec![[0.0; 3]], ..MeshBuffer::new() };
     let weights = [-1.0f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
@@ -173,9 +171,9 @@ fn threads_refuse_what_one_refuses() {
     assert_eq!(mesh, MeshBuffer::new());
 }
 
-/// As where a game has moved what came out before.
+/// A game may have moved the mesh of earlier slabs.
 #[test]
-fn slabs_widen_bounds_that_are_there() {
+fn slabs_widen_existing_bounds() {
     let mut mesh = MeshBuffer { bounds: Some([[-3.0, -2.0, 0.5], [-1.0, 9.0, 1.5]]), ..MeshBuffer::new() };
     let mut mesher = SlabMesher::<f32>::new([3, 2], MeshSettings::default()).expect("the slabs have cells");
     mesher.push(&[1.0; 6], &mut mesh).expect("the slab is whole");

@@ -1,5 +1,4 @@
-//! A chunk's base samples are the same whichever way they are asked for, with bounds that are legal and as odd as can
-//! be.
+//! A chunk's base samples are the same through every function that makes them, with any legal bounds.
 
 use marchless::{BOUND_BOX_CHUNKS, Bound, Grid, GridChunk, Region, Source, SourceRegion};
 use proptest::prelude::*;
@@ -10,14 +9,14 @@ const CELLS: u32 = 8;
 
 #[derive(Clone, Copy, Debug)]
 enum Solid {
-    /// Below a height, in voxels.
+    /// Solid below a height, in voxels.
     Plane(i32),
-    /// Around a point, of a radius, in voxels.
+    /// Solid within a radius of a point, in voxels.
     Ball([i32; 3], i32),
 }
 
 impl Solid {
-    /// In voxels; changes by at most one per voxel.
+    /// The signed distance in voxels; changes by at most one per voxel.
     fn distance(self, point: [f64; 3]) -> f64 {
         match self {
             Self::Plane(height) => point[1] - f64::from(height),
@@ -45,16 +44,16 @@ impl Solid {
     }
 }
 
-/// Which regions a bound is certain of, if they are all solid or all air.
+/// The regions that a bound is certain of, if they are all solid or all air.
 #[derive(Clone, Copy, Debug)]
 enum Knows {
     All,
     Nothing,
-    /// Of so many points per axis or more.
+    /// Regions of at least this many points per axis.
     Large(u32),
-    /// Of so many points per axis or fewer.
+    /// Regions of at most this many points per axis.
     Small(u32),
-    /// By chance.
+    /// Random regions, by this seed.
     Some(u64),
 }
 
@@ -130,7 +129,7 @@ fn source() -> impl Strategy<Value = Odd> {
     (solid, knows(), knows()).prop_map(|(solid, bound, closely)| Odd { solid, bound, closely })
 }
 
-/// The steps of `GridChunk::from_source`, in their order, written out.
+/// `GridChunk::from_source` in plain steps.
 fn plain(source: &Odd, position: [i32; 3], spacing: f64) -> (GridChunk, bool) {
     let region = |corner: [i32; 3], points: i32| {
         let min = corner.map(|v| v * CELLS as i32);
@@ -155,7 +154,7 @@ fn plain(source: &Odd, position: [i32; 3], spacing: f64) -> (GridChunk, bool) {
 
 proptest! {
     #[test]
-    fn base_samples_do_not_depend_on_the_way(
+    fn all_functions_make_the_same_base_samples(
         source in source(),
         spacing in prop_oneof![Just(1.0), Just(0.25)],
         start in prop::array::uniform3(-8i32..5),
@@ -178,7 +177,7 @@ proptest! {
     }
 }
 
-/// Fails if the box of chunks is not asked at all, which random sources show only now and then.
+/// Fails if the bound of the box of chunks is never used, which random sources show only now and then.
 #[test]
 fn a_bound_of_the_box_alone_makes_its_chunks_uniform() {
     let source = Odd { solid: Solid::Plane(-1), bound: Knows::Large(40), closely: Knows::Nothing };
@@ -187,7 +186,7 @@ fn a_bound_of_the_box_alone_makes_its_chunks_uniform() {
 }
 
 #[test]
-fn positions_at_the_ends_of_i32_do_no_harm() {
+fn chunks_at_the_ends_of_i32_follow_their_bounds() {
     let source = Odd { solid: Solid::Plane(0), bound: Knows::All, closely: Knows::All };
     for cells in [8, 31, 62] {
         let end = i32::MAX / cells as i32;

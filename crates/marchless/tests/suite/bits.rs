@@ -1,4 +1,4 @@
-//! Making grids of bits, and their bits one by one.
+//! Constructors of grids of bits, and getting and setting single bits.
 
 use marchless::{
     Samples, Shape, Weight,
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::support::{points, random};
 
-/// Sizes around those of words, and of what vector instructions take at once.
+/// Sizes around those of words and of vector registers.
 const SIZES: [u32; 12] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 600];
 
 fn shapes() -> impl Strategy<Value = Shape> {
@@ -46,7 +46,7 @@ proptest! {
     }
 
     #[test]
-    fn bits_are_where_they_were_put(shape in shapes(), seed: u64) {
+    fn set_bits_are_found_again(shape in shapes(), seed: u64) {
         let is_set = |point| random(seed, point) & 1 == 1;
         let grid = BitGrid::from_fn(shape, is_set).unwrap();
         let expected: Vec<_> = points(shape.size()).filter(|&point| is_set(point)).collect();
@@ -69,7 +69,7 @@ proptest! {
 }
 
 #[test]
-fn what_cannot_be_is_a_typed_error() {
+fn invalid_arguments_are_typed_errors() {
     let huge = Shape::new([1, u32::MAX, 1 << 28]).unwrap();
     assert_eq!(BitGrid::new(huge), Err(BitsError::TooLarge { shape: huge }));
     let shape = Shape::new([3, 4, 5]).unwrap();

@@ -1,4 +1,4 @@
-//! Case masks of rows and of tiles, beside what each cell's corners say.
+//! Case masks of rows and of tiles, against the corners of each cell.
 
 use marchless::{
     Shape,
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::support::{points, random};
 
-/// Sizes around those of tiles and words, and of what vector instructions take at once.
+/// Sizes around those of tiles, words and vector registers.
 const SIZES: [u32; 13] = [1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 130];
 
 fn shapes() -> impl Strategy<Value = Shape> {
@@ -20,7 +20,7 @@ fn shapes() -> impl Strategy<Value = Shape> {
     })
 }
 
-/// A coin for each point, set in `share` of 256.
+/// A random bit for each point, set with a chance of `share` in 256.
 fn coin(seed: u64, share: u8, point: [u32; 3]) -> bool {
     random(seed, point) as u8 <= share
 }
@@ -29,7 +29,7 @@ fn random_grid(shape: Shape, seed: u64, share: u8) -> BitGrid {
     BitGrid::from_fn(shape, |point| coin(seed, share, point)).expect("it is small")
 }
 
-/// What the eight corners of a cell say.
+/// The case mask of a cell, corner by corner.
 fn plain(cell: [u32; 3], is_set: impl Fn([u32; 3]) -> bool) -> u8 {
     let mut mask = 0;
     for corner in Corner::ALL {
@@ -93,7 +93,7 @@ proptest! {
     }
 
     #[test]
-    fn a_tile_moves_as_a_whole(seed: u64, face in 0..6u8) {
+    fn a_shift_moves_every_point_of_a_tile(seed: u64, face in 0..6u8) {
         let (tile, face) = (random_tile(seed), Face::new(face));
         let shifted = tile.shifted(face);
         for point in points([8; 3]) {
@@ -103,7 +103,7 @@ proptest! {
         }
     }
 
-    /// The formulation that a tile's masks have their name from.
+    /// The shifted copies of "Marchless Cubes: Bitfield SIMD Voxel Meshing" give the same masks.
     #[test]
     fn masks_of_a_tile_are_eight_shifted_copies(seed: u64) {
         let tile = random_tile(seed);
@@ -123,7 +123,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_in_unused_bits_does_not_show() {
+fn unused_bits_of_words_and_tiles_stay_zero() {
     let full = BitGrid::filled(Shape::cube(9).expect("it is small"), true).expect("it is small");
     assert!(full.case_masks().expect("it has cells").iter().all(|&mask| mask == 255));
     let cut = TileGrid::from_bits(&full).expect("it is small");

@@ -1,4 +1,4 @@
-//! Meshes of bits: in the middle of edges, placed by functions of all kinds, and those of many materials.
+//! Meshes of bits: with vertices in the middle of edges, with vertices placed by functions, and of many materials.
 
 use std::{cell::Cell, collections::BTreeSet};
 
@@ -25,12 +25,12 @@ fn is_on_border(shape: Shape, point: [u32; 3]) -> bool {
     (0..3).any(|axis| point[axis] == 0 || point[axis] + 1 == shape.size()[axis])
 }
 
-/// White noise of some density; where `enclosed`, nothing on the border.
+/// White noise of some density; with no set point on the border if `enclosed`.
 #[derive(Clone, Copy, Debug)]
 struct Noise {
     shape: Shape,
     seed: u64,
-    /// Of 8 points.
+    /// How many of 8 points are set.
     density: u64,
     enclosed: bool,
 }
@@ -69,7 +69,7 @@ fn middle([low, high]: [[u32; 3]; 2]) -> [f32; 3] {
     [0, 1, 2].map(|axis| (low[axis] + high[axis]) as f32 / 2.0)
 }
 
-/// Positions are not negative: their bits are in the same order.
+/// The positions as bits, in order. No position is negative, so the bits have the order of the numbers.
 fn places(positions: impl IntoIterator<Item = [f32; 3]>) -> BTreeSet<[u32; 3]> {
     positions.into_iter().map(|position| position.map(f32::to_bits)).collect()
 }
@@ -120,20 +120,20 @@ proptest! {
     }
 }
 
-/// Functions to place vertices by.
+/// Functions that place vertices.
 #[derive(Clone, Copy, Debug)]
 enum Function {
     /// Waves of a few cells' length.
     Waves,
-    /// The same, nowhere near the bits' scale: too steep, or all but flat.
+    /// Waves times a factor: far too steep, or almost flat.
     Scaled(f32),
-    /// As the waves' signs say, and nothing in between.
+    /// The signs of the waves, −1 or 1.
     Steps,
-    /// A number of its own for each place, however near to others.
+    /// An unrelated random number at each position.
     Wild,
-    /// Waves with what is not finite strewn in.
+    /// Waves with some values that are not finite.
     Broken,
-    /// The same everywhere.
+    /// One value everywhere.
     Constant(f32),
 }
 
@@ -212,7 +212,7 @@ fn check_placement(noise: Noise, fits: bool, function: Function) -> Result<(), T
                 || ends[0][axis] != ends[1][axis] && (1.0 / 1024.0..=1023.0 / 1024.0).contains(&along);
             prop_assert!(on_edge, "{:?} is not on the edge of {:?}", position, middle);
             if fits && matches!(function, Function::Waves) && (0.002..0.998).contains(&along) {
-                // Some edges hold three zeros.
+                // Some edges have three zeros.
                 prop_assert!(at(position).abs() < 0.03, "{} at {:?}", at(position), position);
                 zeros[usize::from(at(position).abs() < 1e-4)] += 1;
             }
@@ -229,8 +229,8 @@ proptest! {
         check_placement(noise, true, function)?;
     }
 
-    /// What samples of the function give, but for where the vertices lie on their edges; on a plane, in the same
-    /// places.
+    /// Placed meshes equal the meshes of samples of the function, except for the places of vertices on their edges. On
+    /// a plane, the places are equal, too.
     #[test]
     fn placed_meshes_lie_on_spheres_and_planes(
         center in proptest::array::uniform3(4.0f32..9.0),
@@ -258,7 +258,7 @@ proptest! {
                 // Crossings are rounded to 2⁻¹⁴ of their edges.
                 exact += usize::from(off < 0.5 / 16_384.0 + 4e-6);
                 clamped += usize::from(!(0.001..0.999).contains(&along));
-                // Where an edge all but touches a sphere, the zero is hard to find.
+                // The zero is hard to find on an edge that almost touches the sphere.
                 prop_assert!(off < if is_plane { 2e-3 } else { 1e-3 }, "{} at {:?}", function(position), position);
                 let outward = if is_plane { slope.map(|v| v / length) } else { from_center(position).map(|v| v / radius) };
                 for axis in 0..3 {
@@ -274,13 +274,13 @@ proptest! {
     }
 }
 
-/// Noise of a few materials.
+/// Noise of a few materials. The first ones are more frequent if the seed is even.
 #[derive(Clone, Debug)]
 struct Mixture {
     shape: Shape,
     seed: u64,
     planes: u32,
-    /// All that there are; the first ones are the more frequent ones where the seed is even.
+    /// All materials that may occur.
     materials: Vec<u8>,
 }
 
@@ -320,7 +320,7 @@ impl Mixture {
 
 proptest! {
     #[test]
-    fn materials_are_where_they_were_put(mixture in Mixture::any()) {
+    fn set_materials_are_found_again(mixture in Mixture::any()) {
         let grid = mixture.grid();
         let mut built = MaterialGrid::new(mixture.shape, mixture.planes).unwrap();
         prop_assert_eq!((grid.shape(), grid.planes().len()), (mixture.shape, mixture.planes as usize));
@@ -386,7 +386,7 @@ proptest! {
 }
 
 #[test]
-fn what_cannot_be_is_a_typed_error() {
+fn invalid_arguments_are_typed_errors() {
     let mut mesh = MeshBuffer::new();
     let cube = BitGrid::from_fn(Shape::cube(3).unwrap(), |point| point == [1; 3]).unwrap();
     for size in [[1, 2, 2], [2, 1, 2], [2, 2, 1], [1, 1, 1]] {
@@ -432,6 +432,6 @@ fn what_cannot_be_is_a_typed_error() {
     let found = Shape::cube(3).unwrap();
     let mut other = BitGrid::new(found).unwrap();
     assert_eq!(grid.select_into([1], &mut other), Err(BitsError::ShapesDiffer { expected: shape, found }));
-    // 256 materials leave nothing that does not fit.
+    // Every byte is a material of 8 planes.
     assert!(MaterialGrid::from_materials(shape, &[255; 24], 8).is_ok());
 }

@@ -10,15 +10,15 @@ use proptest::{prelude::*, sample::select};
 
 use crate::support::random;
 
-/// Sizes around those of words, four words, and rows that are treated in one, two and three parts.
+/// Sizes around those of one word and of four words, and of rows that are treated in one, two and three parts.
 const SIZES: [u32; 14] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 320, 645, 1000];
 
-/// A grid that says how it was made, not what it holds.
+/// A random grid. Its debug output is the recipe, not the bits.
 #[derive(Clone, Copy)]
 struct Case {
     size: [u32; 3],
     seed: u64,
-    /// Of eight points, how many are set.
+    /// How many of eight points are set.
     density: u64,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Debug for Case {
 
 impl Case {
     fn any() -> impl Strategy<Value = Self> {
-        // Another one, too, beside those that are not long.
+        // A second axis may be long, too, if the first is at most 130.
         let second = select(&[1, 2, 3, 4, 5, 31, 33, 64, 65][..]);
         let size = (select(&SIZES[..]), second, 1..6u32, 0..3usize).prop_map(|(long, a, b, turn)| {
             let mut size = [long, if long > 130 { a.min(5) } else { a }, b];
@@ -74,7 +74,7 @@ fn moved(p: [u32; 3], by: [i32; 3]) -> Option<[u32; 3]> {
     Some(place)
 }
 
-/// The bit at `p + by`, or `outside` where there is none.
+/// The bit at `p + by`, or `outside` beyond the grid.
 fn bit(grid: &BitGrid, p: [u32; 3], by: [i32; 3], outside: bool) -> bool {
     let size = grid.shape().size();
     match moved(p, by).filter(|q| (0..3).all(|axis| q[axis] < size[axis])) {
@@ -97,7 +97,7 @@ fn made(shape: Shape, is_set: impl FnMut([u32; 3]) -> bool) -> BitGrid {
     BitGrid::from_fn(shape, is_set).expect("it is small")
 }
 
-/// Whether two grids are the same, and no bit is set that is no point.
+/// Checks that two grids are equal and that unused bits are zero.
 fn same(found: &BitGrid, expected: &BitGrid) -> Result<(), TestCaseError> {
     prop_assert_eq!(found.shape(), expected.shape());
     let bits: u32 = found.words().iter().map(|word| word.count_ones()).sum();
@@ -110,12 +110,12 @@ fn same(found: &BitGrid, expected: &BitGrid) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Whether each set point of one is set in the other.
+/// True if every set point of `inner` is set in `outer`.
 fn is_within(inner: &BitGrid, outer: &BitGrid) -> bool {
     inner.words().iter().zip(outer.words()).all(|(inner, outer)| inner & !outer == 0)
 }
 
-/// A grid of the same shape with something in it, to be overwritten.
+/// A grid of the same shape with other content, to be overwritten.
 fn used(grid: &BitGrid) -> BitGrid {
     made(grid.shape(), |p| random(7, p) & 1 == 1)
 }
@@ -176,11 +176,11 @@ proptest! {
     #[test]
     fn shifts_compose_and_undo(case in Case::any(), a in offsets(), b in offsets()) {
         let grid = case.grid();
-        // Of the same sign per axis, nothing comes back that has left.
+        // `b` gets the signs of `a`, so that no point that has left comes back.
         let b = [0, 1, 2].map(|axis| if (a[axis] < 0) == (b[axis] < 0) { b[axis] } else { !b[axis] });
         let sum = [0, 1, 2].map(|axis| a[axis].saturating_add(b[axis]));
         same(&grid.shifted(a).shifted(b), &grid.shifted(sum))?;
-        // Whatever does not leave comes back.
+        // Points that do not leave the grid come back.
         if a.iter().all(|&v| v != i32::MIN) {
             let stays = made(case.shape(), |p| grid.get(p) && {
                 let there = moved(p, a);
@@ -217,7 +217,7 @@ proptest! {
         same(&grid.eroded(connectivity), &changed(&not.dilated(connectivity), BitGrid::invert))?;
         let more = changed(&grid, |grid| grid.or_with(&case.other()).unwrap());
         prop_assert!(is_within(&grid.dilated(connectivity), &more.dilated(connectivity)));
-        // Away from the border, it makes no difference what is done first.
+        // Away from the border, dilation and shift commute.
         let mut far = BitGrid::new(Shape::new(case.size.map(|size| size + 6)).unwrap()).unwrap();
         for p in grid.iter() {
             far.set(p.map(|v| v + 3), true).unwrap();
@@ -246,7 +246,7 @@ proptest! {
     }
 }
 
-/// Rows longer than those masks of words that are kept for several rows.
+/// Rows longer than the inline masks, which hold 256 words.
 #[test]
 fn long_rows_are_shifted_and_counted() {
     let case = Case { size: [16_500, 2, 2], seed: 5, density: 3 };
@@ -264,9 +264,9 @@ fn long_rows_are_shifted_and_counted() {
     same(&grid.stepped(&Rule::new(&counts, &[]).unwrap().with_outside(true)), &expected).unwrap();
 }
 
-/// Every count of neighbours, of a point that is set and of one that is not, with rules of one count and with ranges.
+/// Every count of neighbours around a set and an unset point, with rules of a single count and with ranges.
 #[test]
-fn an_automaton_knows_every_count() {
+fn rules_tell_every_count_apart() {
     let around = neighbours(Connectivity::TwentySix);
     for (count, middle) in (0..=26).flat_map(|count| [(count, false), (count, true)]) {
         let mut grid = BitGrid::new(Shape::cube(3).unwrap()).unwrap();
@@ -286,7 +286,7 @@ fn an_automaton_knows_every_count() {
 }
 
 #[test]
-fn what_cannot_be_is_a_typed_error_and_changes_nothing() {
+fn refused_operations_return_typed_errors_and_change_nothing() {
     let grid = made(Shape::new([5, 4, 3]).unwrap(), |p| random(1, p) & 1 == 1);
     let other = made(Shape::new([5, 3, 4]).unwrap(), |p| random(2, p) & 1 == 1);
     let rule = Rule::new(&[3], &[2, 3]).unwrap();

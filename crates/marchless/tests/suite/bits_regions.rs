@@ -1,4 +1,4 @@
-//! Flood fill, connected components and overlaps, beside plain versions point by point.
+//! Flood fill, connected components and overlaps, against plain versions point by point.
 
 use std::collections::HashSet;
 
@@ -14,7 +14,7 @@ use crate::support::{points, random};
 /// Sizes around those of words.
 const SIZES: [u32; 12] = [1, 2, 31, 32, 33, 63, 64, 65, 127, 130, 250, 600];
 
-/// What makes a grid: its size, how many of eight points are set, and the seed for which.
+/// A random grid: its size, how many of eight points are set, and the seed.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     size: [u32; 3],
@@ -31,14 +31,14 @@ impl Case {
         BitGrid::from_fn(Shape::new(self.size).unwrap(), |point| self.is_set(point)).unwrap()
     }
 
-    /// The points that are set, in the order of memory.
+    /// The set points, in memory order.
     fn set(&self) -> Vec<[u32; 3]> {
         points(self.size).filter(|&point| self.is_set(point)).collect()
     }
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    // Another one, too, beside those that are not long.
+    // A second axis may be long, too, if the first is at most 130.
     let second = proptest::sample::select(&[1, 2, 3, 4, 5, 31, 33, 65][..]);
     let sizes = (proptest::sample::select(&SIZES[..]), second, 1..6u32, 0..3usize);
     (sizes, 0..=8u64, any::<u64>()).prop_map(|((long, a, b, turn), eighths, seed)| {
@@ -48,7 +48,7 @@ fn cases() -> impl Strategy<Value = Case> {
     })
 }
 
-/// What a queue reaches from seeds, point by point.
+/// The points that a breadth-first search reaches from seeds.
 fn reached(case: &Case, seeds: &[[u32; 3]], connectivity: Connectivity) -> HashSet<[u32; 3]> {
     let far = match connectivity {
         Connectivity::Six => 1,
@@ -75,7 +75,7 @@ fn points_of(grid: &BitGrid) -> HashSet<[u32; 3]> {
     grid.iter().collect()
 }
 
-/// The smallest region that holds some points.
+/// The smallest region that holds all these points.
 fn bounds(points: &HashSet<[u32; 3]>) -> Region {
     let ends = |axis: usize| {
         let all = points.iter().map(|point| point[axis] as i32);
@@ -102,7 +102,7 @@ fn floods_are_what_a_queue_reaches(case: Case, count: usize) -> TestCaseResult {
         let filled = grid.flood(&seeds, connectivity).unwrap();
         prop_assert!(points_of(&filled) == expected, "{connectivity:?}");
         prop_assert!(filled == grid.flood_from(&from, connectivity).unwrap());
-        // A flood from several seeds is all of what each fills.
+        // A flood from several seeds is the union of the floods from each.
         let mut each = HashSet::new();
         for &seed in &seeds {
             each.extend(grid.flood(&[seed], connectivity).unwrap().iter());
@@ -122,7 +122,7 @@ fn components_are_what_a_queue_finds(case: Case) -> TestCaseResult {
             if seen.contains(&first) {
                 continue;
             }
-            // The next component, by its first point.
+            // The next component is that of the next point that no other component has.
             let expected = reached(&case, &[first], connectivity);
             let component = components.get(sizes.len());
             prop_assert!(component.is_some(), "too few with {connectivity:?}");
@@ -130,7 +130,7 @@ fn components_are_what_a_queue_finds(case: Case) -> TestCaseResult {
             prop_assert_eq!(component.first, first);
             prop_assert_eq!(component.size, expected.len());
             prop_assert_eq!(component.bounds, bounds(&expected));
-            // Cutting out every one of many would take long.
+            // Masks of all components would take long if there are many.
             if sizes.len() < 20 {
                 let mask = components.mask(sizes.len());
                 prop_assert!(points_of(&mask) == expected);
@@ -154,7 +154,7 @@ fn components_are_what_a_queue_finds(case: Case) -> TestCaseResult {
     Ok(())
 }
 
-/// A region that may lie inside, across the border, far outside or inside out.
+/// A region inside the grid, across its border or far outside, or an inverted one.
 fn regions() -> impl Strategy<Value = Region> {
     let end = || prop_oneof![8 => -3..135i32, 1 => Just(i32::MIN), 1 => Just(i32::MAX)];
     let short = || prop_oneof![8 => -2..8i32, 1 => Just(i32::MIN), 1 => Just(i32::MAX)];
@@ -197,12 +197,12 @@ proptest! {
         }
     }
 
-    /// Eighths below 2¹⁰, whose squares and their sums `f64` holds exactly.
+    /// Centres and radii are multiples of 1/8. `f64` holds their squares and the sums of these exactly.
     #[test]
     fn balls(case in cases(), balls in proptest::collection::vec((uniform3(-40..1100i32), 0..400i32, any::<bool>()), 20)) {
         let (grid, set) = (case.grid(), case.set());
         for (centre, radius, near) in balls {
-            // Where the grid is short, the ball should not always lie outside.
+            // Half of the balls are moved near the grid.
             let centre: [i32; 3] = std::array::from_fn(|axis| {
                 if near { centre[axis] % (8 * case.size[axis] as i32 + 8) } else { centre[axis] }
             });
@@ -211,7 +211,7 @@ proptest! {
             let eighths = |v: i32| v as f32 / 8.0;
             let expected = nearest.is_some_and(|nearest| nearest <= radius * radius);
             prop_assert_eq!(grid.overlaps_ball(centre.map(eighths), eighths(radius)), expected);
-            // As close as a ball that touches can be, on whole points.
+            // Balls that barely reach the nearest set point, and barely miss it.
             if let Some(nearest) = nearest {
                 let root = f64::from(nearest).sqrt();
                 prop_assert!(grid.overlaps_ball(centre.map(eighths), (root / 8.0 * 1.000_001) as f32));
@@ -220,7 +220,7 @@ proptest! {
         }
     }
 
-    /// Any bits as numbers: nothing panics or takes long, and what is clear is right.
+    /// Centres and radii of any bits. Nothing panics or takes long, and all answers outside of rounding are right.
     #[test]
     fn any_ball(case in cases(), centre: [u32; 3], radius: u32) {
         let (centre, radius) = (centre.map(f32::from_bits), f32::from_bits(radius));
@@ -241,7 +241,7 @@ proptest! {
     fn grids_at_offsets(a in cases(), b in cases(), offsets in proptest::collection::vec(uniform3(-131..131i32), 20)) {
         let (one, other) = (a.grid(), b.grid());
         let far = [[i32::MAX, 0, 0], [0, i32::MIN, 0], [0, 0, i32::MAX], [i32::MIN; 3], [0; 3]];
-        // Such that the grids have something in common, for the most part.
+        // These offsets mostly leave the grids with points in common.
         let near = offsets.iter().map(|offset| {
             std::array::from_fn(|axis| offset[axis] % (a.size[axis].max(b.size[axis]) as i32 + 1))
         });
@@ -259,11 +259,11 @@ proptest! {
     }
 }
 
-/// A path that winds through a whole volume, and the same in a ball of it cut into pieces.
+/// A path that winds through a whole volume: first whole, then cut in two.
 #[test]
-fn a_long_way_is_one_component() {
+fn a_long_winding_path_is_one_component() {
     let size = [130, 33, 9];
-    // Walls on every other row, with a gap at either end by turns; likewise floors.
+    // Every other row is a wall with a gap at one end, every other layer a floor with a gap; the ends alternate.
     let open = |[x, y, z]: [u32; 3]| match (z % 2, y % 2) {
         (0, 0) => true,
         (0, _) => x == if y / 2 % 2 == 0 { 129 } else { 0 },
@@ -282,7 +282,7 @@ fn a_long_way_is_one_component() {
 }
 
 #[test]
-fn what_cannot_be_is_a_typed_error_or_nothing() {
+fn degenerate_arguments_are_typed_errors_or_match_nothing() {
     let case = Case { size: [65, 3, 4], eighths: 8, seed: 0 };
     let (grid, shape) = (case.grid(), Shape::new(case.size).unwrap());
     for position in [[65, 0, 0], [0, 3, 0], [0, 0, 4], [u32::MAX; 3]] {

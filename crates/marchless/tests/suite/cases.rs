@@ -1,8 +1,8 @@
-//! The 256 cases, derived once more by another route, and checked in all pairs of neighbours.
+//! The 256 cases, derived independently and checked in all pairs of neighbours.
 //!
-//! Here no loop is ever followed. On each face, inside corners that are neighbours belong together, and each such
-//! group is cut off by one segment between the two edges that leave it; which way the segment runs follows from
-//! where the group lies. A case's triangles must have exactly these segments as their boundary.
+//! This derivation follows no loops. On each face, neighbouring inside corners form a group. One segment between the
+//! two edges that leave the group cuts it off; the direction of the segment follows from where the group lies. The
+//! boundary of a case's triangles must be exactly these segments.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +16,7 @@ use marchless::{
 /// A directed line between the crossings of two edges.
 type Segment = [usize; 2];
 
-/// The ends of edge `edge`, as its number says: four along x, four along y, four along z.
+/// The ends of an edge: edges 0–3 run along x, 4–7 along y, 8–11 along z.
 fn ends(edge: usize) -> [usize; 2] {
     let others = match edge / 4 {
         0 => [2, 4],
@@ -27,7 +27,7 @@ fn ends(edge: usize) -> [usize; 2] {
     [low, low + (1 << (edge / 4))]
 }
 
-/// Corner `corner`, in the middle of the lattice's units doubled.
+/// The position of a corner, in half cells.
 fn corner_position(corner: usize) -> [i64; 3] {
     [0, 1, 2].map(|axis| 2 * (corner >> axis & 1) as i64)
 }
@@ -49,7 +49,7 @@ fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
     (0..3).map(|axis| a[axis] * b[axis]).sum()
 }
 
-/// The six faces: four corners each.
+/// The six faces, each with its axis, whether it is the high one, and its four corners.
 fn faces() -> impl Iterator<Item = (usize, bool, Vec<usize>)> {
     (0..6).map(|face| {
         let (axis, high) = (face / 2, face % 2 == 1);
@@ -103,7 +103,7 @@ fn triangles(case: usize) -> Vec<[usize; 3]> {
     TRIANGLES[case][..count].iter().map(|triangle| triangle.map(Edge::index)).collect()
 }
 
-/// How often each directed side occurs, less how often its reverse does; sides that cancel are left out.
+/// For each directed side, how often it occurs minus how often its reverse does. Sides that cancel are left out.
 fn boundary(triangles: &[[usize; 3]]) -> BTreeMap<Segment, i32> {
     let mut sides = BTreeMap::new();
     for triangle in triangles {
@@ -211,7 +211,7 @@ fn all_pairs_of_neighbours_fit() {
                 }
             }
             let triangles: Vec<[usize; 3]> = indices.as_chunks().0.to_vec();
-            // What is left open must not lie in the face between the two cells: samples 4 to 7.
+            // The remaining boundary must not lie in the face between the two cells: samples 4 to 7.
             for side in boundary(&triangles).keys() {
                 let shared = side.iter().all(|&crossing| known[crossing].iter().all(|end| (4..8).contains(end)));
                 assert!(!shared, "axis {axis}, samples {samples:012b}: {side:?} is open");
@@ -237,10 +237,10 @@ fn place(edge: usize, step: i64) -> [i64; 3] {
     position
 }
 
-/// Whether the insides of two triangles have a point in common.
+/// True if the interiors of two triangles have a point in common.
 ///
-/// They have none where some axis separates them; for two triangles, it is enough to try the normals, the products of
-/// a side of each, and what lies in a triangle's plane across a side.
+/// They have none if an axis separates them. For two triangles it is enough to try the normals, the cross products of a
+/// side of each, and the directions in a triangle's plane across its sides.
 fn triangles_cross(a: [[i64; 3]; 3], b: [[i64; 3]; 3]) -> bool {
     let sides = |t: [[i64; 3]; 3]| [0, 1, 2].map(|corner| minus(t[(corner + 1) % 3], t[corner]));
     let (sides_a, sides_b) = (sides(a), sides(b));
@@ -274,7 +274,7 @@ fn crossing_triangles_are_noticed() {
     let standing = |x: i64| [[x, 1, -1], [x, 1, 3], [x + 9, 9, 3]];
     assert!(triangles_cross(floor, standing(1)));
     assert!(!triangles_cross(floor, standing(5)));
-    // A shared corner and a shared side do not count, overlapping in a plane does.
+    // A shared corner or side is no crossing; an overlap in one plane is one.
     assert!(!triangles_cross(floor, [[0, 0, 0], [-4, 0, 1], [0, -4, 1]]));
     assert!(!triangles_cross(floor, [[4, 0, 0], [0, 4, 0], [4, 4, 0]]));
     assert!(triangles_cross(floor, [[4, 0, 0], [0, 4, 0], [1, 1, 0]]));
@@ -286,7 +286,7 @@ fn triangles_never_cross_at_random_placements() {
     for case in 0..256 {
         let triangles = triangles(case);
         for _ in 0..500 {
-            // Ends more often than chance would have it: that is where triangles come close.
+            // Half of the crossings are at an end of their edge, where triangles come close.
             let steps = [(); 12].map(|()| match random.u8(..4) {
                 0 => 1,
                 1 => STEPS - 1,

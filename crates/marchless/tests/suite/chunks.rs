@@ -11,11 +11,11 @@ use volumes::{Volume, VolumeWeight};
 
 const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
 
-/// A place in the volume, exactly: `f64` holds the sum of a chunk's origin and an `f32` within the chunk.
+/// An exact place in the volume: `f64` holds the sum of a chunk's origin and an `f32` position within the chunk.
 type Place = [u64; 3];
 
-/// Where a vertex belongs: twice the coordinates of the lattice's edge or cell, odd along each axis that it extends
-/// along.
+/// The lattice edge or cell of a vertex: twice the coordinates of its middle, which are odd along each axis that it
+/// extends along.
 type Home = [i32; 3];
 
 fn is_interior(position: &[f32; 3]) -> bool {
@@ -84,7 +84,7 @@ impl GridChunk {
         self.coordinates(vertex).map(|v| 2 * v.floor() as i32 + i32::from(v.fract() != 0.0))
     }
 
-    /// The triangles by where their vertices belong, each from its least one on.
+    /// The triangles by the homes of their vertices, each rotated to start with the least.
     fn triangles(&self) -> impl Iterator<Item = [Home; 3]> {
         self.mesh.triangles().map(|triangle| {
             let mut homes = triangle.map(|vertex| self.home(vertex));
@@ -130,7 +130,7 @@ fn check_chunks<W: VolumeWeight>(volume: &Volume, cells: u32, topology: Topology
     Ok(())
 }
 
-/// All chunks whose box holds a vertex have it, with the same bits.
+/// Every chunk whose box holds a vertex has that vertex, bit for bit.
 fn check_vertices(chunks: &[GridChunk]) -> Result<(), TestCaseError> {
     let mut known: HashMap<Place, ([u32; 3], u8, usize)> = HashMap::new();
     for chunk in chunks {
@@ -153,7 +153,7 @@ fn check_vertices(chunks: &[GridChunk]) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Each side of a rim is one of another chunk's rim the other way round, or lies in a face of the volume.
+/// Each side of a chunk's rim is the reverse of a side of another chunk's rim, or lies in a face of the volume.
 fn check_rims(volume: &Volume, chunks: &[GridChunk]) -> Result<(), TestCaseError> {
     let mut rims: HashSet<[Place; 2]> = HashSet::new();
     for chunk in chunks {

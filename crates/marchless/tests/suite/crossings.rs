@@ -1,5 +1,5 @@
-//! Crossing triangles against a plain oracle: all pairs, in whole numbers, by cutting each side of a triangle to what
-//! the other triangle leaves of it.
+//! Crossing triangles against a plain oracle, which tries all pairs in whole numbers: it clips each side of a triangle
+//! to the other triangle.
 
 use marchless::MeshReport;
 use proptest::{collection::vec, prelude::*};
@@ -35,10 +35,10 @@ impl Fraction {
     }
 }
 
-/// The first and the last part of the way from `p` to `q` that lies in the triangle.
+/// The part of the way from `p` to `q` that lies in the triangle: the fractions where it starts and ends.
 fn cut([p, q]: [Point; 2], triangle: [Point; 3]) -> Option<[Fraction; 2]> {
     let plane = normal(triangle);
-    // Where each is not negative: on both sides of the plane, and on the inner side of the three sides.
+    // A point is in the triangle where none of these is negative: both signs of the plane, and the three sides.
     let mut limits = vec![(triangle[0], plane), (triangle[0], plane.map(|v| -v))];
     limits.extend((0..3).map(|i| (triangle[i], across(plane, minus(triangle[(i + 1) % 3], triangle[i])))));
     let [mut first, mut last] = [Fraction(0, 1), Fraction(1, 1)];
@@ -60,13 +60,13 @@ fn cut([p, q]: [Point; 2], triangle: [Point; 3]) -> Option<[Fraction; 2]> {
     (!last.is_below(first)).then_some([first, last])
 }
 
-/// Whether two triangles have a point in common that is neither a common corner nor on a common side.
+/// True if two triangles share a point that is neither a common corner nor on a common side.
 fn cross(a: [Point; 3], b: [Point; 3]) -> bool {
     let common: Vec<Point> = a.into_iter().filter(|corner| b.contains(corner)).collect();
     if common.len() == 3 {
         return true;
     }
-    // What they have in common is convex, and its corners are on sides of one of them.
+    // Their intersection is convex, and each of its corners is on a side of one of them.
     [(a, b), (b, a)].into_iter().any(|(sides, other)| {
         (0..3).any(|i| {
             let [p, q] = [sides[i], sides[(i + 1) % 3]];
@@ -79,7 +79,7 @@ fn cross(a: [Point; 3], b: [Point; 3]) -> bool {
     })
 }
 
-/// The plain count.
+/// The number of crossing triangles by the oracle.
 fn crossings(positions: &[Point], indices: &[u32]) -> usize {
     let mut seen = Vec::new();
     let mut triangles = Vec::new();
@@ -111,7 +111,7 @@ fn soup(limit: i128, vertices: u32, triangles: usize) -> impl Strategy<Value = (
     })
 }
 
-/// From where a product of three is the smallest subnormal number to where it would overflow `f32`.
+/// Scales from where a product of three coordinates is the smallest subnormal number to where it overflows `f32`.
 fn scales() -> impl Strategy<Value = f32> {
     prop_oneof![Just(1.0), Just(f32::from_bits(1)), Just(2f32.powi(-60)), Just(2f32.powi(113))]
 }
@@ -141,7 +141,7 @@ proptest! {
     }
 }
 
-/// All reports of triangles two by two.
+/// The sum of the crossings in the reports of all pairs of triangles.
 fn by_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> usize {
     let pairs = (0..triangles.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
     pairs.map(|pair| MeshReport::new(positions, pair.map(|i| triangles[i]).as_flattened()).crossing_triangles).sum()
@@ -150,7 +150,7 @@ fn by_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> usize {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Triangles of very different sizes, alone, in clusters and far out.
+    /// Triangles of very different sizes, isolated, in clusters and far away.
     #[test]
     fn all_pairs_are_found(
         parts in vec(([-1.0f32..1.0, -1.0..1.0, -1.0..1.0], 0..9i32, vec([-1.0f32..1.0, -1.0..1.0, -1.0..1.0], 3)), 2..80),
@@ -167,9 +167,9 @@ proptest! {
         prop_assert_eq!(found, by_pairs(&positions, &triangles));
     }
 
-    /// Whatever the numbers are, the order of triangles, corners and axes does not matter.
+    /// With any coordinates, the report does not depend on the order of triangles, corners and axes.
     #[test]
-    fn order_does_not_matter(
+    fn order_does_not_change_the_report(
         positions in vec(
             proptest::array::uniform3(prop_oneof![
                 4 => proptest::sample::select(vec![0.0f32, 1.0, -1.0, 1e-45, 1e-38, 1e20, f32::MAX, f32::MIN]),
@@ -201,9 +201,9 @@ proptest! {
     }
 }
 
-/// Pairs that all have the same answer, each a way to meet of its own.
+/// One example for each way in which two triangles can meet.
 #[test]
-fn ways_to_meet() {
+fn all_ways_for_two_triangles_to_meet_are_judged() {
     let a = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let crossing = |b: [[f32; 3]; 3]| MeshReport::new([a, b].as_flattened(), &[0, 1, 2, 3, 4, 5]).crossing_triangles;
     let cases = [
@@ -229,9 +229,9 @@ fn ways_to_meet() {
     }
 }
 
-/// A count that would take hours ends early.
+/// Thousands of copies of one triangle: the full count would take hours.
 #[test]
-fn heaps_are_given_up() {
+fn the_count_of_crossings_stops_at_its_limit() {
     let positions: Vec<[f32; 3]> =
         (0..15_000).map(|i| [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]][i % 3]).collect();
     let indices: Vec<u32> = (0..15_000).collect();

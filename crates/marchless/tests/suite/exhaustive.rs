@@ -1,6 +1,7 @@
-//! Every pattern of signs in one cell, in two neighbours and in 2 × 2 × 1 cells, and ten million of 2 × 2 × 2: the
-//! surface is closed but for its rim in the faces of the box, 2-manifold, consistently oriented and free of anything
-//! degenerate, in both topologies, whatever the values are that have these signs.
+//! Every pattern of signs in one cell, in two neighbours and in 2 × 2 × 1 cells, and ten million patterns of 2 × 2 × 2.
+//!
+//! In both topologies, and with any values of these signs, the surface is closed except for its rim in the faces of the
+//! box, 2-manifold, consistently oriented, and without degenerate triangles.
 
 mod small;
 
@@ -12,20 +13,20 @@ use small::{Defect, SmallBox, SmallJudge};
 
 const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
 
-/// Values that have given signs.
+/// Kinds of values with given signs.
 #[derive(Clone, Copy, Debug)]
 enum Values {
     /// −1 and 1: every saddle equals the isovalue.
     Ones,
-    /// Whole numbers up to 3: many do.
+    /// Whole numbers up to 3: many saddles equal the isovalue.
     Few,
     /// −1, 0 and 1: samples equal the isovalue, too.
     Zeros,
-    /// Evenly spread.
+    /// Uniformly distributed.
     Even,
-    /// Of 1e-38 to 1e38.
+    /// Magnitudes from 1e-38 to 1e38.
     Wide,
-    /// Not finite, as large as can be, or next to nothing.
+    /// Not finite, the largest, or almost zero.
     Extreme,
 }
 
@@ -54,14 +55,14 @@ impl Values {
     }
 }
 
-/// A mesher, its mesh, the judge of it, and where values come from.
+/// A mesher, its mesh, the judge of the mesh, and a source of random values.
 struct Bench {
     mesher: Mesher,
     mesh: MeshBuffer,
     judge: SmallJudge,
     random: Rng,
     weights: [f32; 27],
-    /// How many meshes were made, and the triangles of all.
+    /// The number of meshes made.
     meshes: usize,
     triangles: usize,
 }
@@ -79,7 +80,7 @@ impl Bench {
         }
     }
 
-    /// Makes up values.
+    /// Fills the samples with random values.
     fn fill(&mut self, small: SmallBox, values: Values) {
         for index in 0..small.len() {
             self.weights[index as usize] = values.value(small.inside >> index & 1 == 1, &mut self.random);
@@ -99,7 +100,7 @@ impl Bench {
         MeshReport::in_box(&self.mesh.positions, &self.mesh.indices, small.bounds())
     }
 
-    /// Both topologies of one set of values.
+    /// Checks both topologies of one set of values.
     fn check(&mut self, small: SmallBox, values: Values) {
         self.fill(small, values);
         for topology in TOPOLOGIES {
@@ -180,7 +181,7 @@ fn ten_million_patterns_of_2_by_2_by_2_cells_are_sound() {
     assert_eq!(meshes, 20_000_000);
 }
 
-/// With the long report, which looks for triangles that cross each other in space.
+/// Checks with the full report, which also finds triangles that cross each other.
 #[test]
 fn the_triangles_of_a_cell_never_cross() {
     let mut bench = Bench::new(24);
@@ -198,7 +199,7 @@ fn the_triangles_of_a_cell_never_cross() {
     }
 }
 
-/// Spoils a mesh in one of many ways.
+/// Damages a mesh in a random way.
 fn spoil(mesh: &mut MeshBuffer, random: &mut Rng) {
     let mut any = |len: usize| random.usize(..len);
     let (vertices, corners) = (mesh.positions.len(), mesh.indices.len());
@@ -226,8 +227,8 @@ fn spoil(mesh: &mut MeshBuffer, random: &mut Rng) {
     }
 }
 
-/// Meshes that the judge lets pass are clean in the long report too, whole and spoilt; so what it says counts. Of
-/// triangles that cross each other it knows nothing.
+/// Meshes that the judge accepts, intact or damaged, are clean in the full report, too, except for triangles that cross
+/// each other: the judge does not look for those.
 #[test]
 fn the_judge_is_no_milder_than_the_report() {
     let mut bench = Bench::new(42);

@@ -1,4 +1,5 @@
-//! Every mesh that is made from samples has its vertices on their crossings; and what is not so is told.
+//! `ExtractionReport`: every mesh has its vertices on the crossings of its samples, and the report counts those that
+//! are missing, repeated or elsewhere.
 
 use fastrand::Rng;
 use marchless::{ExtractionReport, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
@@ -14,7 +15,7 @@ fn mesh<W: Weight>(samples: Samples<'_, W>, settings: &MeshSettings) -> MeshBuff
     mesh
 }
 
-/// Edges of the lattice whose ends are on two sides, counted from their samples.
+/// The number of lattice edges whose ends are on different sides, counted from the samples.
 fn crossings<W: TestWeight>(field: &Field<W>) -> usize {
     let [nx, ny, nz] = field.meshed_size();
     let padding = u32::from(field.padded);
@@ -45,7 +46,7 @@ fn check<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
         prop_assert_eq!(sound.vertices, sound.crossings + sound.interior_vertices);
         prop_assert_eq!(topology == Topology::Separated && sound.interior_vertices > 0, false);
 
-        // One that is missing, one that is there twice.
+        // A vertex that is missing, and one that is repeated.
         let Some(vertex) = mesh.positions.iter().position(|p| p.iter().filter(|v| v.fract() == 0.0).count() == 2)
         else {
             continue;
@@ -62,7 +63,7 @@ fn check<W: TestWeight>(field: &Field<W>) -> Result<(), TestCaseError> {
         prop_assert_eq!(report, expected);
         mesh.positions.pop();
 
-        // One that is elsewhere on its edge; one that is on no edge, so that its crossing has none.
+        // A vertex elsewhere on its edge; vertices on no edge, which leave their crossing without a vertex.
         let axis = removed.iter().position(|v| v.fract() != 0.0).expect("it lies on an edge");
         let mut moved = removed;
         moved[axis] = moved[axis].floor() + if moved[axis].fract() > 0.5 { 0.25 } else { 0.75 };
@@ -97,7 +98,7 @@ proptest! {
     }
 
     #[test]
-    fn nonsense_is_counted(
+    fn counts_of_random_vertices_are_consistent(
         field in Field::<f32>::any(),
         positions in proptest::collection::vec(
             proptest::array::uniform3(prop_oneof![proptest::num::f32::ANY, 0f32..5.0, (0..5u8).prop_map(f32::from)]),
@@ -117,7 +118,7 @@ proptest! {
     }
 }
 
-/// One cell, a single corner of which is inside: what counts as a vertex inside it.
+/// Two cells, of which only the first is active: one of its corners is inside.
 #[test]
 fn interior_vertices_belong_to_active_cells_of_the_trilinear_topology() {
     let shape = Shape::new([3, 2, 2]).expect("a small shape");
@@ -143,7 +144,7 @@ fn interior_vertices_belong_to_active_cells_of_the_trilinear_topology() {
 
 /// White noise has cells of every kind.
 #[test]
-fn the_trilinear_topology_needs_some_interior_vertices() {
+fn only_the_trilinear_topology_has_interior_vertices() {
     let shape = Shape::cube(16).expect("a small shape");
     let mut random = Rng::with_seed(16);
     let weights: Vec<i16> = (0..shape.len()).map(|_| random.i16(..)).collect();

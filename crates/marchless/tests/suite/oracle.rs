@@ -1,5 +1,5 @@
-//! The mesher against a plain marching cubes that goes from cell to cell: the same triangles in the same order, of
-//! vertices in the same places.
+//! The mesher against a plain marching cubes, cell by cell: equal triangles in equal order, and vertices in equal
+//! places.
 
 use std::collections::HashMap;
 
@@ -9,12 +9,12 @@ use proptest::prelude::*;
 
 use crate::support::{Field, TestWeight};
 
-/// Where a vertex lies: on the edge from a meshed sample along an axis.
+/// The lattice edge of a vertex: the meshed sample at its lower end, and its axis.
 type LatticeEdge = ([u32; 3], usize);
 
 struct OracleVertex {
     edge: LatticeEdge,
-    /// Before rounding.
+    /// The fraction before rounding.
     fraction: f64,
     /// The gradients at both ends of the edge.
     slopes: [[f64; 3]; 2],
@@ -22,8 +22,8 @@ struct OracleVertex {
 }
 
 impl OracleVertex {
-    /// The normal, of any length, of a vertex at `fraction` of the edge. `None` if the differences that make it cancel
-    /// each other more than the arithmetic can bear.
+    /// The normal of a vertex at `fraction` of the edge, of any length. `None` if its differences cancel out so much
+    /// that rounding decides it.
     fn normal(&self, fraction: f64) -> Option<[f64; 3]> {
         let [a, b] = self.slopes;
         let normal: [f64; 3] = core::array::from_fn(|k| a[k] + (b[k] - a[k]) * fraction);
@@ -32,7 +32,7 @@ impl OracleVertex {
     }
 }
 
-/// The plain marching cubes: every cell for itself, its vertices looked up by their edges.
+/// The plain marching cubes: each cell by itself, with vertices looked up by their edges.
 fn march<W: TestWeight>(field: &Field<W>) -> (Vec<OracleVertex>, Vec<u32>) {
     let [nx, ny, nz] = field.meshed_size();
     let (mut vertices, mut indices) = (Vec::new(), Vec::new());
@@ -89,7 +89,7 @@ fn distance<W: TestWeight>(field: &Field<W>, at: [u32; 3]) -> f64 {
     finite(field.weights[index(field, at, [0; 3])])
 }
 
-/// In voxels; NaN is outside, and nothing lies beyond what `f32` can say.
+/// A weight in voxels. NaN is outside; infinite weights become the largest finite ones.
 fn finite<W: Weight>(weight: W) -> f64 {
     let distance = f64::from(weight.to_voxels());
     if distance.is_nan() { f32::MAX.into() } else { distance.clamp(f32::MIN.into(), f32::MAX.into()) }
@@ -100,7 +100,8 @@ fn index<W: TestWeight>(field: &Field<W>, at: [u32; 3], step: [i32; 3]) -> usize
     field.shape.index(core::array::from_fn(|axis| (at[axis] as i32 + step[axis] + padding) as u32))
 }
 
-/// The edge that a vertex of the mesher lies on, and how far along: clamped crossings never reach a lattice point.
+/// The lattice edge of one of the mesher's vertices, and the fraction along it. Clamped crossings never reach a lattice
+/// point.
 fn edge_of(position: [f32; 3]) -> (LatticeEdge, f64) {
     let axis = (0..3).find(|&axis| position[axis].fract() != 0.0).expect("a vertex is no lattice point");
     assert!((0..3).all(|other| other == axis || position[other].fract() == 0.0), "{position:?} is on no edge");

@@ -78,7 +78,7 @@ fn grid<W: AnyWeight>(field: Field, seed: u64, cells: u32, bounds: Region) -> Gr
     grid
 }
 
-/// A vertex in lattice space, exactly: `f64` holds the sum of a chunk's origin and an `f32` within the chunk.
+/// An exact place in lattice space: `f64` holds the sum of a chunk's origin and an `f32` position within the chunk.
 type Key = [u64; 3];
 
 fn key(origin: [i32; 3], position: [f32; 3]) -> Key {
@@ -96,7 +96,7 @@ fn meshes<W: AnyWeight>(grid: &Grid<W>, settings: &MeshSettings) -> BTreeMap<[i3
     grid.bounds().expect("a bounded grid").points().map(mesh).collect()
 }
 
-/// The vertices of a chunk's mesh that lie on the border it shares with another chunk: normal and material by place.
+/// The vertices of a chunk's mesh on the border that it shares with another chunk: normal and material by place.
 fn border<W: Weight>(
     grid: &Grid<W>,
     mesh: &MeshBuffer,

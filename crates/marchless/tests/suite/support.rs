@@ -1,4 +1,4 @@
-//! What several topics need.
+//! Helpers that several test modules share.
 
 mod fields;
 mod random;

@@ -1,6 +1,6 @@
-//! What every surface promises, whatever the samples are and in both topologies: closed within the box, 2-manifold,
-//! consistently oriented, nothing degenerate, vertices where the crossings are, normals of length 1; and what smooth
-//! fields get on top.
+//! The guarantees for every surface, with any samples and in both topologies: closed within the box, 2-manifold,
+//! consistently oriented, nothing degenerate, vertices on the crossings, normals of length 1. Smooth fields have
+//! further ones.
 
 use std::collections::HashMap;
 
@@ -34,7 +34,7 @@ fn unit(v: [f32; 3]) -> [f32; 3] {
     v.map(|component| component / dot(v, v).sqrt())
 }
 
-/// The sides of triangles that no other triangle has the other way round.
+/// The sides of triangles whose reverse is no side of another triangle.
 fn open_sides(mesh: &MeshBuffer) -> Vec<[u32; 2]> {
     let mut sides = HashMap::new();
     for [a, b, c] in mesh.triangles() {
@@ -71,7 +71,7 @@ fn check<W: TestWeight>(field: &Field<W>, topology: Topology) -> Result<(), Test
     Ok(())
 }
 
-/// The same field with air all around.
+/// The field with air in its outermost samples.
 fn enclosed<W: TestWeight>(mut field: Field<W>) -> Field<W> {
     let size = field.shape.size();
     let depth = 1 + u32::from(field.padded);
@@ -116,7 +116,8 @@ proptest! {
         check_both(field)?;
     }
 
-    /// Whole steps, so that the samples are the plane's exactly. Crossings are rounded to 2⁻¹⁴ of their edges.
+    /// The plane's distances are whole steps, so that the samples are exact. Crossings are rounded to 2⁻¹⁴ of their
+    /// edges.
     #[test]
     fn planes_are_exact(
         slope in proptest::array::uniform3(-200i16..=200),
@@ -143,7 +144,7 @@ proptest! {
                 prop_assert!((found[axis] - normal[axis]).abs() < 1e-6, "{:?} for {:?}", found, normal);
             }
             let along = position.iter().map(|v| v.fract()).fold(0.0, f32::max);
-            // Where it is not clamped.
+            // Clamped crossings are not on the plane.
             if (0.001..0.999).contains(&along) {
                 let distance = (dot(position, slope) + f32::from(offset)) / dot(slope, slope).sqrt();
                 prop_assert!(distance.abs() < 0.5 / 16_384.0 + 1e-5, "{:?} is {} off the plane", position, distance);
@@ -189,7 +190,7 @@ proptest! {
     }
 }
 
-/// The clamp of crossings still has room in `f32` at the far end of the longest row that is promised.
+/// `f32` resolves the clamp of crossings even at the far end of the longest row with guarantees.
 #[test]
 fn rows_of_4096_cells_are_sound() {
     let shape = Shape::new([4097, 3, 3]).expect("it fits in memory");
@@ -216,7 +217,7 @@ fn ball(size: u32) -> Vec<f32> {
 }
 
 #[test]
-fn what_cannot_be_meshed_is_a_typed_error_and_leaves_nothing() {
+fn refused_samples_are_typed_errors_and_clear_the_buffer() {
     let cube = |size| Shape::cube(size).expect("small");
     let weights = ball(8);
     let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
@@ -238,7 +239,7 @@ fn what_cannot_be_meshed_is_a_typed_error_and_leaves_nothing() {
 }
 
 #[test]
-fn a_reused_buffer_holds_only_what_was_asked_for() {
+fn a_reused_buffer_holds_only_the_requested_attributes() {
     let (weights, materials) = (ball(12), vec![7; 12 * 12 * 12]);
     let samples = Samples::new(Shape::cube(12).expect("small"), &weights).expect("one weight a sample");
     let with_materials = samples.with_materials(&materials).expect("one material a sample");
@@ -255,8 +256,8 @@ fn a_reused_buffer_holds_only_what_was_asked_for() {
     assert_eq!(lengths(samples, false), [count, 0, 0]);
 }
 
-/// Scaled by a power of two, all weights and the isovalue are as exact as before, and so is everything decided by them:
-/// the triangles of both.
+/// The meshes of a cell, and of the cell scaled by a power of two. The scale rounds nothing, so all decisions and all
+/// triangles must be equal.
 fn cell_and_scaled(weights: [f32; 8], isovalue: f32) -> [MeshBuffer; 2] {
     [1.0, 2f32.powi(-60)].map(|scale| {
         let weights = weights.map(|weight| weight * scale);
@@ -267,7 +268,7 @@ fn cell_and_scaled(weights: [f32; 8], isovalue: f32) -> [MeshBuffer; 2] {
 
 proptest! {
     #[test]
-    fn scale_decides_nothing(
+    fn the_scale_of_weights_does_not_change_triangles(
         weights in proptest::array::uniform8(prop_oneof![-3.4e38f32..3.4e38, -1e37f32..1e37]),
         isovalue in prop_oneof![Just(0.0), -3e38f32..3e38],
     ) {
@@ -276,7 +277,7 @@ proptest! {
     }
 }
 
-/// Where a weight and the isovalue are at the two ends of `f32`, their difference does not fit it.
+/// A weight and an isovalue near opposite ends of `f32` have a difference that overflows `f32`.
 #[test]
 fn tunnels_are_found_at_the_limits_of_f32() {
     let (max, min) = (f32::MAX, f32::MIN);

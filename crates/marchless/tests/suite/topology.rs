@@ -1,5 +1,5 @@
-//! The topology of the surface against references that know nothing of cases, loops or decisions: digital topology for
-//! the default, a refinement of the trilinear interpolant for the exact one.
+//! The topology of the surface against references without cases, loops or decisions: digital topology for the default
+//! one, a refinement of the trilinear interpolant for the exact one.
 
 mod digital;
 mod disjoint;
@@ -13,7 +13,7 @@ use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, To
 use pieces::{Piece, pieces_of};
 use refined::Lattice;
 
-/// How far saddles keep away from the isovalue, in parts of the range of a cell's values.
+/// The least distance of saddles from the isovalue, as a fraction of the range of a cell's values.
 const DISTANCE: f64 = 0.05;
 
 const FIELDS: usize = 200;
@@ -38,7 +38,7 @@ fn mesh(lattice: &Lattice, topology: Topology) -> MeshBuffer {
     mesh_of::<f32>(lattice, MeshSettings { topology, ..MeshSettings::default() })
 }
 
-/// With the isovalue above the lattice's zero.
+/// The mesh of a lattice whose values are raised by the isovalue.
 fn mesh_of<W: Weight>(lattice: &Lattice, settings: MeshSettings) -> MeshBuffer {
     let weights: Vec<W> =
         lattice.values.iter().map(|&value| W::from_voxels(value as f32 + settings.isovalue)).collect();
@@ -53,8 +53,8 @@ fn case_of(corners: [f64; 8]) -> usize {
     (0..8).filter(|&corner| corners[corner] < 0.0).map(|corner| 1 << corner).sum()
 }
 
-/// Whether the signs of the corners leave anything to decide: alternating signs on a face, or two opposite corners
-/// apart from all others.
+/// True if the signs of the corners leave something to decide: they alternate on a face, or two opposite corners differ
+/// from all others.
 fn is_ambiguous(case: usize) -> bool {
     let inside = |corner: usize| case >> corner & 1;
     let faces = (0..3).flat_map(|axis| {
@@ -70,7 +70,7 @@ fn is_ambiguous(case: usize) -> bool {
     faces.into_iter().any(alternates) || opposite
 }
 
-/// A random cell with these signs, all of whose saddles keep their distance.
+/// A random cell with these signs, with no saddle near the isovalue.
 fn random_cell(case: usize, random: &mut Rng) -> Lattice {
     loop {
         let corners = core::array::from_fn(|corner| value(case >> corner & 1 == 1, random));
@@ -80,9 +80,9 @@ fn random_cell(case: usize, random: &mut Rng) -> Lattice {
     }
 }
 
-/// Cells whose topology is plain to see.
+/// Cells whose topology is obvious.
 #[test]
-fn the_refinement_knows_simple_cells() {
+fn the_refinement_is_right_in_simple_cells() {
     let pieces = |values: [f64; 8]| {
         refined::pieces_of(&cell(values)).iter().map(|piece| (piece.crossings.len(), piece.euler, piece.rims)).collect()
     };
@@ -91,10 +91,10 @@ fn the_refinement_knows_simple_cells() {
         assert_eq!(found, expected, "{values:?}");
     };
     check([1.0; 8], &[]);
-    // A plane across, and one corner cut off.
+    // A plane across the cell; one corner cut off.
     check([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0], &[(4, 1, 1)]);
     check([-1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0], &[(3, 1, 1)]);
-    // Two corners across a face, apart and joined; across the cell, apart and joined by a tunnel.
+    // Two corners diagonal in a face, separate and joined; diagonal in the cell, separate and joined by a tunnel.
     check([-0.5, 1.0, 1.0, -0.5, 1.0, 1.0, 1.0, 1.0], &[(3, 1, 1), (3, 1, 1)]);
     check([-1.0, 0.5, 0.5, -1.0, 1.0, 1.0, 1.0, 1.0], &[(6, 1, 1)]);
     check([-0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, -0.5], &[(3, 1, 1), (3, 1, 1)]);
@@ -103,7 +103,7 @@ fn the_refinement_knows_simple_cells() {
 }
 
 #[test]
-fn cells_that_leave_nothing_to_decide_are_the_same_in_both() {
+fn unambiguous_cells_are_equal_in_both_topologies() {
     let mut random = Rng::with_seed(1);
     for case in (0..256).filter(|&case| !is_ambiguous(case)) {
         for _ in 0..4 {
@@ -143,9 +143,9 @@ fn ambiguous_cells_have_the_topology_of_the_interpolant() {
     }
 }
 
-/// Values that all weights hold exactly; ties and all.
+/// The values are exact in all types of weights; some equal the isovalue.
 #[test]
-fn cells_of_all_weights_and_isovalues_are_alike() {
+fn all_types_of_weights_and_all_isovalues_give_one_topology() {
     let mut random = Rng::with_seed(816);
     for case in (0..256).filter(|&case| is_ambiguous(case)) {
         for number in 0..60 {
@@ -164,7 +164,7 @@ fn cells_of_all_weights_and_isovalues_are_alike() {
     }
 }
 
-/// A lattice of random samples, all of whose saddles keep their distance; with air around it where it is `enclosed`.
+/// A lattice of random samples with no saddle near the isovalue. The outermost samples are air if it is `enclosed`.
 fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Rng) -> Lattice {
     let size = cells.map(|n| n as usize + 1);
     let mut field = Lattice { size, values: vec![1.0; size.iter().product()] };
@@ -176,12 +176,12 @@ fn random_field(cells: [u64; 3], enclosed: bool, smooth: bool, random: &mut Rng)
         let wave = |axis: usize| (point[axis] as f64 * (0.8 + 0.2 * phases[axis]) + phases[axis + 3]).sin();
         field.values[index] = match (enclosed && outermost(point), smooth) {
             (true, _) => value(false, random),
-            // Whole 4096ths.
+            // Odd multiples of 1/8192: exact in the refinement, and never zero.
             (false, true) => ((wave(0) + wave(1) * wave(2)) * 2048.0).round() / 4096.0 + 1.0 / 8192.0,
             (false, false) => any_value(random),
         };
     }
-    // Samples are drawn anew until the last cell is well.
+    // Redraws samples until no cell has a saddle near the isovalue.
     loop {
         let spoilt: Vec<[usize; 3]> =
             field.cells().filter(|&cell| saddles::distance(&field.corners(cell)) < DISTANCE).collect();
@@ -229,7 +229,7 @@ fn fields_have_the_topology_of_the_interpolant() {
         "{FIELDS} fields of {pieces} pieces and {handles} handles, {agree} agree, {as_separated} with the default"
     );
     if let Some((field, expected, found)) = first {
-        // A single cell says more, where there is one that differs by itself.
+        // A cell that differs by itself makes a better message.
         for at in field.cells() {
             let lattice = cell(field.corners(at));
             let [expected, found] = [refined::pieces_of(&lattice), pieces_of(&mesh(&lattice, Topology::Trilinear))];
@@ -241,7 +241,7 @@ fn fields_have_the_topology_of_the_interpolant() {
     }
 }
 
-/// A set of points with room around it.
+/// A random set of points, none of them outermost.
 fn random_set(size: [usize; 3], share: u64, random: &mut Rng) -> Digital {
     let len: usize = size.iter().product();
     let inside = |index: usize, random: &mut Rng| {
@@ -261,7 +261,7 @@ fn check_digital(set: &Digital, random: &mut Rng) {
 }
 
 #[test]
-fn the_default_topology_is_that_of_6_and_18_neighbours() {
+fn the_default_topology_joins_6_neighbours_inside_and_18_outside() {
     let mut random = Rng::with_seed(6 + 18);
     for case in 0..256u32 {
         let inside = |index: usize| {

@@ -24,14 +24,14 @@ fn distance_oracle(shape: &QuantisedShape, point: [i32; 3]) -> f64 {
 
 proptest! {
     #[test]
-    fn distances_are_those_of_a_textbook(shape in small_shape(), point in prop::array::uniform3(-60i32..60)) {
+    fn distances_equal_the_textbook_formulas(shape in small_shape(), point in prop::array::uniform3(-60i32..60)) {
         let (found, exact) = (f64::from(shape.distance(point)), distance_oracle(&shape, point));
         prop_assert!((found - exact).abs() <= 1.0, "{found}, not {exact}");
         prop_assert!(exact.abs() < 1e-6 || (found < 0.0) == (exact < 0.0), "{found}, not {exact}");
     }
 
     #[test]
-    fn distances_far_out_are_those_of_a_textbook_or_saturate(
+    fn far_distances_equal_the_textbook_formulas_or_saturate(
         center in prop::array::uniform3(-(1i64 << 38)..1 << 38),
         length in prop::array::uniform3(-(1i64 << 19)..1 << 19),
         radius in 1u32..1 << 18,

@@ -9,7 +9,7 @@ fn on_threads(mesh: &Mesh, threads: usize) -> MeshReport {
     MeshReport::examine(&mesh.0, &mesh.1, Some([[0.0; 3], [100.0; 3]]), &mut work).expect("nobody cancels")
 }
 
-/// Triangles in a row of tori, all of them parts of one mesh, with random changes: every kind of defect, many times.
+/// A mesh of a row of tori with random damage: it has every kind of defect many times.
 fn flawed(tori: u32, seed: u64) -> Mesh {
     let mut state = seed;
     let mut random = |below: u32| {

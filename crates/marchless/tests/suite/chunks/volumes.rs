@@ -1,14 +1,14 @@
-//! Random volumes without end, of which any box can be cut out: what a sample is depends on where it is and on a seed.
+//! Endless random volumes from which any box can be cut: a sample depends on its position and a seed only.
 
 use marchless::{Samples, Shape, Weight};
 use proptest::{prelude::*, sample::select};
 
 use crate::support::random;
 
-/// What the samples are like.
+/// The kind of the samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Kind {
-    /// Signs as a coin falls, magnitudes evenly spread.
+    /// Random signs, uniform magnitudes.
     Signs,
     /// Waves of a few voxels' length.
     Smooth,
@@ -16,7 +16,7 @@ pub(crate) enum Kind {
     Ones,
     /// One step inside, one outside, or equal to the isovalue.
     Ties,
-    /// Of any magnitude that there is.
+    /// Any magnitude that the type of weights has.
     Magnitudes,
     /// Not finite, or next to such samples.
     NotFinite,
@@ -29,7 +29,7 @@ pub(crate) struct Volume {
     pub(crate) seed: u64,
     /// Cells per axis: 2 to 32.
     pub(crate) cells: [u32; 3],
-    /// Whether the samples at the border of the box, and those beyond, are air.
+    /// True if the samples at the border of the box and beyond are air.
     pub(crate) enclosed: bool,
     /// In voxels.
     pub(crate) isovalue: f32,
@@ -96,7 +96,7 @@ impl<W> Cut<W> {
 /// Weights that volumes are made of.
 pub(crate) trait VolumeWeight: Weight {
     fn of_any_magnitude(bits: u64) -> Self;
-    /// The ends of what there is, and what lies between.
+    /// The extreme weights of the type, and values between them.
     fn extreme(bits: u64) -> Self;
 }
 

@@ -1,15 +1,15 @@
-//! A judge of tiny meshes that takes about a microsecond: all that it keeps is a few words per vertex.
+//! [`SmallJudge`]: a check of tiny meshes that takes about a microsecond. It keeps only a few words per vertex.
 //!
-//! It asks for more than [`MeshReport`](marchless::MeshReport) does, since it knows the samples: a vertex on each
-//! crossing and nowhere else (but strictly inside cells, where that is allowed), a rim in the faces of the box only,
-//! and no inner side of two triangles in a face of the box, where a neighbour's could meet it.
+//! It knows the samples, so it demands more than [`MeshReport`](marchless::MeshReport): one vertex on each crossing and
+//! none elsewhere (except strictly inside cells, where that is allowed), a rim in the faces of the box only, and no
+//! side of two triangles in a face of the box, where it could meet a neighbour's side.
 
 use marchless::MeshBuffer;
 
-/// Vertices that a mesh may have.
+/// The most vertices that a mesh may have.
 const LIMIT: usize = 64;
 
-/// What is wrong with a mesh; vertices by their index.
+/// A defect of a mesh. Vertices are given by their indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(dead_code, reason = "what the variants hold is there to be printed")]
 pub(crate) enum Defect {
@@ -20,7 +20,7 @@ pub(crate) enum Defect {
     ZeroArea([u32; 3]),
     /// Two triangles have the same side in the same direction.
     SideTwice([u32; 2]),
-    /// A side of one triangle, within the box.
+    /// A side of a single triangle in the interior of the box.
     Crack([usize; 2]),
     /// A side of two triangles, in a face of the box.
     InnerSideInFace([usize; 2]),
@@ -41,12 +41,12 @@ pub(crate) enum Defect {
     },
 }
 
-/// What is sound about a sound mesh.
+/// The counts of a sound mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Sound {
-    /// Sides of one triangle.
+    /// The number of sides with a single triangle.
     pub(crate) rim: usize,
-    /// Vertices strictly inside of cells.
+    /// The number of vertices strictly inside cells.
     pub(crate) interior: usize,
 }
 
@@ -64,7 +64,7 @@ impl SmallBox {
         self.size[0] * self.size[1] * self.size[2]
     }
 
-    /// Where it lies in space.
+    /// The lowest and the highest corner in space.
     pub(crate) fn bounds(self) -> [[f32; 3]; 2] {
         [[0.0; 3], self.size.map(|n| (n - 1) as f32)]
     }
@@ -81,7 +81,7 @@ impl SmallBox {
         self.inside >> index & 1 == 1
     }
 
-    /// Whether the cell above the sample at `index` has corners on both sides.
+    /// True if the cell whose lowest corner is the sample at `index` has corners on both sides.
     fn is_active(self, index: u32) -> bool {
         let corners =
             (0..8).map(|corner| index + (0..3).map(|axis| (corner >> axis & 1) * self.stride(axis)).sum::<u32>());
@@ -102,12 +102,13 @@ impl SmallBox {
     }
 }
 
-/// The judge; keeps its memory.
+/// Checks meshes, and keeps its memory between them.
 pub(crate) struct SmallJudge {
     /// `follows[a][b]` is the third vertex of the triangle with the side from `a` to `b`.
     follows: Box<[[u8; LIMIT]; LIMIT]>,
-    /// A bit for each vertex that a side from this one leads to, and that a side to this one comes from.
+    /// For each vertex, a bit for each vertex that a side from it leads to.
     leaving: [u64; LIMIT],
+    /// For each vertex, a bit for each vertex that a side to it comes from.
     arriving: [u64; LIMIT],
     /// The faces of the box that each vertex lies in, a bit each.
     faces: [u8; LIMIT],
@@ -118,7 +119,7 @@ impl SmallJudge {
         Self { follows: Box::new([[0; LIMIT]; LIMIT]), leaving: [0; LIMIT], arriving: [0; LIMIT], faces: [0; LIMIT] }
     }
 
-    /// Examines the mesh of the samples of `small`; vertices inside of cells are fine where `interior` says so.
+    /// Checks the mesh of the samples of `small`. Vertices inside cells are allowed if `interior` is true.
     pub(crate) fn judge(&mut self, mesh: &MeshBuffer, small: SmallBox, interior: bool) -> Result<Sound, Defect> {
         let count = mesh.positions.len();
         if count > LIMIT {
@@ -209,7 +210,7 @@ impl SmallJudge {
         Ok(())
     }
 
-    /// Returns how many sides without another half leave the vertex: 0 or 1.
+    /// Returns the number of sides that leave the vertex and have no reverse: 0 or 1.
     fn judge_vertex(&self, vertex: usize) -> Result<usize, Defect> {
         let (leaving, arriving) = (self.leaving[vertex], self.arriving[vertex]);
         if leaving == 0 {

@@ -7,7 +7,7 @@ use proptest::{collection::vec, prelude::*, sample::select};
 #[derive(Clone, Debug)]
 pub(crate) struct Field<W> {
     pub(crate) shape: Shape,
-    /// In memory of just their size, so that a sanitizer sees a read behind the last one.
+    /// A boxed slice of exactly their length, so that a sanitizer sees a read past the last one.
     pub(crate) weights: Box<[W]>,
     pub(crate) materials: Box<[u8]>,
     pub(crate) padded: bool,
@@ -15,8 +15,8 @@ pub(crate) struct Field<W> {
 }
 
 impl<W: TestWeight> Field<W> {
-    /// Any field: white noise of a few or of all weights, sparse or dense; layers of slabs that are all inside or
-    /// outside but for a sample or so.
+    /// Any field: white noise of a few or of all weights, sparse or dense; or layers of slabs that are all inside or
+    /// all outside, except for about one sample.
     pub(crate) fn any() -> impl Strategy<Value = Self> {
         (sizes(), any::<bool>(), 0..5usize).prop_flat_map(|(size, padded, kind)| {
             let shape = Shape::new(size.map(|n| n + 2 * u32::from(padded))).expect("the sizes are small");
@@ -86,7 +86,7 @@ fn sizes() -> impl Strategy<Value = [u32; 3]> {
 
 /// Weights worth testing.
 pub(crate) trait TestWeight: Weight {
-    /// Such that signs alternate, and some equal an isovalue.
+    /// A few weights of both signs, some of them equal to an isovalue.
     const NEAR_ZERO: &'static [Self];
     const EXTREMES: &'static [Self];
     fn all() -> BoxedStrategy<Self>;

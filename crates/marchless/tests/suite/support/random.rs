@@ -1,8 +1,8 @@
-//! Random numbers at places.
+//! Random numbers by position.
 
 use fastrand::Rng;
 
-/// A number for each point, or for any other three numbers; another seed gives others.
+/// A random number for each point, or for any other three numbers, and each seed.
 ///
 /// Tests that need numbers one after the other take [`Rng::with_seed`].
 pub(crate) fn random(seed: u64, point: [impl Into<i64>; 3]) -> u64 {

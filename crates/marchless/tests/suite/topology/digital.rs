@@ -1,10 +1,11 @@
 //! Digital topology of a set of lattice points: inside by 6 neighbours, outside by 18.
 //!
-//! Inside points hang together along edges of the lattice, outside points also across a square, but not across a cube:
-//! two lone opposite corners of a cube, of whichever side, are apart. The inside, thickened, is then a complex of its
-//! points, of the edges, squares and cubes all of whose corners are inside, and of one more piece in each cube that is
-//! inside but for two opposite corners: its six other corners form a ring of edges without a square, and it is filled.
-//! The boundary of a body in space has twice the body's Euler number, and n closed surfaces cut space into n + 1 parts.
+//! Inside points are connected along lattice edges. Outside points are connected across a square, too, but not across a
+//! cube: two lone opposite corners of a cube are separate on either side. So the thickened inside is a complex of its
+//! points and of the edges, squares and cubes whose corners are all inside. Each cube that is inside except for two
+//! opposite corners has one more piece: its six other corners form a ring of edges without a square, which is filled.
+//!
+//! The boundary of a body has twice the body's Euler number, and n closed surfaces cut space into n + 1 parts.
 
 use super::disjoint::Disjoint;
 
@@ -27,7 +28,7 @@ impl Digital {
         (0..nx * ny * nz).map(move |index| [index % nx, index / nx % ny, index / nx / ny])
     }
 
-    /// The point `step` away, where there is one.
+    /// The point `step` away, if the lattice has it.
     fn neighbour(&self, point: [usize; 3], step: [isize; 3]) -> Option<usize> {
         let mut other = [0; 3];
         for axis in 0..3 {
@@ -36,8 +37,8 @@ impl Digital {
         Some(self.index(other))
     }
 
-    /// How many parts the points that are inside, or those outside, fall into: neighbours differ in at most
-    /// `most_steps` coordinates, by 1.
+    /// The number of connected parts of the inside or outside points. Neighbours differ by 1 in at most `most_steps`
+    /// coordinates.
     fn parts(&self, inside: bool, most_steps: usize) -> usize {
         let steps = || (0..27).map(|i: isize| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
         let mut joined = Disjoint::new(self.inside.len());
@@ -63,7 +64,7 @@ impl Digital {
 
     /// The Euler number of the inside.
     pub(crate) fn euler(&self) -> i64 {
-        // Corners of a cube, and of each square, edge and point at its lowest corner, by the axes they extend along.
+        // The corners of the point, edge, square or cube that extends from `point` along `axes`, a bit for each axis.
         let corners = |point: [usize; 3], axes: usize| -> Vec<Option<bool>> {
             let offsets = (0..8).filter(|corner| corner & !axes == 0);
             offsets
@@ -88,8 +89,8 @@ impl Digital {
     }
 }
 
-/// In every cube, the complex has as many parts as there are groups of inside corners, and no holes: so it is what the
-/// thickened inside of the cube is.
+/// In every cube, the complex has one part for each group of connected inside corners, and no holes, like the thickened
+/// inside.
 #[test]
 fn the_complex_is_sound_in_every_cube() {
     for case in 0..256 {

@@ -3,7 +3,7 @@
 pub(crate) struct Disjoint(Vec<u32>);
 
 impl Disjoint {
-    /// Every number on its own.
+    /// Each number in a set of its own.
     pub(crate) fn new(len: usize) -> Self {
         Self((0..len as u32).collect())
     }
@@ -17,7 +17,7 @@ impl Disjoint {
         item
     }
 
-    /// Makes one set of two.
+    /// Unites the sets of two numbers.
     pub(crate) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b)] = a.min(b) as u32;

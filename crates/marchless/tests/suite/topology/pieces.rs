@@ -1,4 +1,4 @@
-//! What a surface is, up to deformation: its pieces, each told by the lattice edges that it crosses.
+//! A surface up to deformation: its connected pieces, each identified by the lattice edges that it crosses.
 
 use core::fmt;
 use std::collections::HashMap;
@@ -13,12 +13,12 @@ pub(crate) type LatticeEdge = ([u32; 3], usize);
 /// A connected piece of a surface.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Piece {
-    /// The lattice edges that it crosses, in order. There is at least one: in a cell where all of a piece lay between
-    /// edges, the interpolant would have an extremum, and it has none but at corners.
+    /// The lattice edges that it crosses, in order. There is at least one: a piece that crossed none would enclose an
+    /// extremum of the interpolant within a cell, and extrema are at corners only.
     pub(crate) crossings: Vec<LatticeEdge>,
     /// Its Euler characteristic.
     pub(crate) euler: i64,
-    /// How many loops its rim consists of.
+    /// The number of loops of its rim.
     pub(crate) rims: usize,
 }
 
@@ -62,7 +62,7 @@ pub(crate) fn pieces_of(mesh: &MeshBuffer) -> Vec<Piece> {
     in_order(pieces.into_values().collect())
 }
 
-/// The lattice edge that a vertex lies on; none where it lies inside of a cell.
+/// The lattice edge of a vertex; `None` if it lies inside a cell.
 fn lattice_edge(position: [f32; 3]) -> Option<LatticeEdge> {
     let mut along = (0..3).filter(|&axis| position[axis].fract() != 0.0);
     let axis = along.next().expect("crossings keep away from samples");

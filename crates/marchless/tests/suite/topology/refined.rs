@@ -1,10 +1,10 @@
-//! The surface of the trilinear interpolant, by refinement: each cell becomes 16 × 16 × 16 small ones, each of those
-//! six simplices, and what is counted are changes of sign. No case, no face rule, no saddle.
+//! The surface of the trilinear interpolant, by refinement: each cell becomes 16 × 16 × 16 small cells, and each of
+//! those six simplices. The reference counts changes of sign; it has no cases, no face rule and no saddles.
 //!
-//! The simplices around a small cell's diagonal from its lowest to its highest corner, one for each order of the axes,
-//! fit from cell to cell (Freudenthal, Kuhn). Where the ends of a simplex edge have different signs, the surface has a
-//! vertex; in a triangle it then has a line, and in a tetrahedron a triangle or a quadrilateral. So the Euler
-//! characteristic is that of edges − triangles + tetrahedra, of those with two signs.
+//! The simplices surround a small cell's diagonal from its lowest to its highest corner, one for each order of the
+//! axes; they fit from cell to cell (Freudenthal, Kuhn). Where the ends of a simplex edge have different signs, the
+//! surface has a vertex; in a triangle with both signs it has a line, in such a tetrahedron a triangle or a
+//! quadrilateral. So the Euler characteristic is edges − triangles + tetrahedra, counting those with both signs.
 
 use std::collections::HashMap;
 
@@ -16,7 +16,7 @@ use super::{
 /// Small cells per cell and axis.
 const STEPS: usize = 16;
 
-/// Samples of a lattice, as numbers that the refinement is exact for: whole ones, and few digits of them.
+/// Samples of a lattice, with so few digits that the refinement is exact.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
     /// Samples per axis.
@@ -37,7 +37,7 @@ impl Lattice {
         })
     }
 
-    /// All cells, by their lowest corners.
+    /// The lowest corners of all cells.
     pub(crate) fn cells(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
         let [nx, ny, nz] = self.size.map(|n| n - 1);
         (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
@@ -49,7 +49,7 @@ pub(crate) fn pieces_of(lattice: &Lattice) -> Vec<Piece> {
     pieces_in_steps(lattice, STEPS)
 }
 
-/// The same with any number of small cells per cell and axis.
+/// [`pieces_of`] with any number of small cells per cell and axis.
 pub(crate) fn pieces_in_steps(lattice: &Lattice, steps: usize) -> Vec<Piece> {
     let refined = Refined::of(lattice, steps);
     let mut surface = Surface::new(&refined);
@@ -74,7 +74,7 @@ impl Refined {
             if corners.iter().all(|&corner| corner > 0.0) {
                 continue;
             }
-            // Points that cells share are computed by each, with the same result: everything is exact.
+            // Several cells compute the points that they share. The results are equal, since all is exact.
             let mix = |a: f64, b: f64, at: usize| a * (steps - at) as f64 + b * at as f64;
             for z in 0..=steps {
                 let [v0, v1, v2, v3] = [0, 1, 2, 3].map(|corner| mix(corners[corner], corners[corner + 4], z));
@@ -91,12 +91,12 @@ impl Refined {
         Self { size, inside }
     }
 
-    /// How far apart in memory the ends of a simplex edge are; bit 0 of its direction is a step along x.
+    /// The distance in memory between the ends of a simplex edge; bit 0 of its direction is a step along x.
     fn step(&self, direction: usize) -> usize {
         (direction & 1) + (direction >> 1 & 1) * self.size[0] + (direction >> 2) * self.size[0] * self.size[1]
     }
 
-    /// All points from which there is a step along each of `axes`, by index.
+    /// The indices of all points from which a step along each of `axes` stays in the lattice.
     fn points(&self, axes: [bool; 3]) -> impl Iterator<Item = usize> + use<> {
         let [nx, ny, _] = self.size;
         let [x_end, y_end, z_end] = core::array::from_fn(|axis| self.size[axis] - usize::from(axes[axis]));
@@ -104,20 +104,20 @@ impl Refined {
     }
 }
 
-/// The orders of the axes: the way from a small cell's lowest corner to its highest, a step along each.
+/// The paths from a small cell's lowest corner to its highest, a step along each axis: one for each order of the axes.
 const WAYS: [[usize; 4]; 6] = [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
-/// A vertex for each simplex edge with two signs, and what lies between them.
+/// The surface: a vertex for each simplex edge with both signs, and the lines and faces between them.
 struct Surface<'a> {
     refined: &'a Refined,
     /// One more than a vertex's number, by its edge's lower end and direction (times 7); 0 where there is none.
     numbers: Vec<u32>,
     vertices: usize,
-    /// Vertices that belong to the same piece: two of each line.
+    /// The two vertices of each line; they belong to one piece.
     lines: Vec<[usize; 2]>,
     /// The lines of the rim.
     rim: Vec<[usize; 2]>,
-    /// For each triangle or quadrilateral, one of its vertices and how many sides it has.
+    /// For each triangle or quadrilateral, one of its vertices and its number of sides.
     faces: Vec<(usize, usize)>,
 }
 
@@ -127,7 +127,7 @@ impl<'a> Surface<'a> {
         Self { refined, numbers, vertices: 0, lines: Vec::new(), rim: Vec::new(), faces: Vec::new() }
     }
 
-    /// The vertices on a simplex of `N` points, that are corners of the small cell at `base`.
+    /// The vertices on a simplex whose `N` points are corners of the small cell at `base`.
     fn vertices_on<const N: usize>(&mut self, base: usize, corners: [usize; N]) -> Vec<usize> {
         let mut vertices = Vec::with_capacity(4);
         let points = corners.map(|corner| base + self.refined.step(corner));
@@ -162,7 +162,7 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// The rim, in the faces of the whole box.
+    /// Adds the rim, which lies in the faces of the whole box.
     fn cross_faces(&mut self) {
         for axis in 0..3 {
             let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
@@ -190,7 +190,7 @@ impl<'a> Surface<'a> {
             joined
         });
         let mut pieces: HashMap<usize, Piece> = HashMap::new();
-        // Twice the sides: each is seen from both of its faces, or from one and from the rim.
+        // Twice the number of sides: each is counted by both of its faces, or by one face and the rim.
         let mut sides: HashMap<usize, i64> = HashMap::new();
         for vertex in 0..self.vertices {
             pieces.entry(joined.root(vertex)).or_default().euler += 1;
@@ -218,7 +218,7 @@ impl<'a> Surface<'a> {
         in_order(pieces.into_values().collect())
     }
 
-    /// The surface's vertex on each edge of the lattice that it crosses.
+    /// The lattice edges that the surface crosses, each with its vertex.
     fn crossings(&self, lattice: &Lattice, steps: usize) -> Vec<(LatticeEdge, usize)> {
         let mut crossings = Vec::new();
         for axis in 0..3 {

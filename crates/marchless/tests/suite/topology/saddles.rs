@@ -1,8 +1,8 @@
-//! How near a field's saddles come to the isovalue, zero: where they come too near, no refinement can tell which way
-//! the surface goes. Only for choosing inputs.
+//! The distance of a field's saddles from the isovalue, zero, for the choice of inputs: near a saddle, no refinement
+//! can tell which way the surface goes.
 
-/// How far the saddles of the trilinear interpolant in a cell, on its faces and within, keep away from zero, in parts
-/// of the range of the corners' values.
+/// The least distance of a cell's saddles from zero, on its faces and within, as a fraction of the range of the
+/// corners' values.
 ///
 /// `corners`: bit 0 of a corner is its x.
 pub(crate) fn distance(corners: &[f64; 8]) -> f64 {
@@ -52,7 +52,7 @@ fn body_saddles(corners: &[f64; 8]) -> Vec<f64> {
     saddles
 }
 
-/// Whether a coordinate lies in the cell; NaN does not.
+/// True if a coordinate lies in the cell; false for NaN.
 fn is_within(coordinate: f64) -> bool {
     (0.0..=1.0).contains(&coordinate)
 }
