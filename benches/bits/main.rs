@@ -1,6 +1,6 @@
-//! What whole-grid operations on bits take, beside copying the grid and beside what others offer for it.
+//! The times of whole-grid operations on bits, compared with a copy of the grid and with peers.
 //!
-//! `cargo bench -p marchless_benches --bench bits`; a filter behind `--` as ever.
+//! Run it by `cargo bench -p marchless_benches --bench bits`; a filter may follow after `--`.
 
 mod masks;
 mod ops;

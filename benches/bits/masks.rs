@@ -1,9 +1,9 @@
 //! Case masks: by rows, by tiles, and by the word strides of the peer, at 256³.
 //!
-//! On one core of an AMD EPYC (Zen 4, AVX-512), shared with others: rows 2.0 ms and tiles 2.6 ms, whatever the field;
-//! the peer 6 ms on nothing, 39 ms on ground alone, 47 ms on caves, 53 ms on white noise. The same algorithm in C takes
-//! longer (gcc -O2: 58 ms on caves, 130 ms on white noise; -O3: 52 ms and 169 ms), since LLVM turns most of the
-//! branches into selections.
+//! On one shared core of an AMD EPYC (Zen 4, AVX-512), rows take 2.0 ms and tiles 2.6 ms on any field. The peer takes 6
+//! ms on an empty field, 39 ms on ground alone, 47 ms on caves, 53 ms on white noise. The peer's algorithm in C takes
+//! longer (gcc -O2: 58 ms on caves, 130 ms on white noise; -O3: 52 ms and 169 ms), since LLVM turns most branches into
+//! selections.
 
 use core::{hint::black_box, time::Duration};
 use std::env;
@@ -20,7 +20,7 @@ use crate::word_stride::WordStride;
 const FIELDS: [Field; 4] = [Field::Empty, Field::Solid, Field::Caves, Field::WhiteNoise];
 
 pub(crate) fn benches(criterion: &mut Criterion) {
-    // As criterion itself decides: without `--bench`, it is `cargo test` that calls.
+    // Criterion's own rule: without `--bench`, the caller is `cargo test`.
     let testing =
         !env::args().any(|argument| argument == "--bench") || env::args().any(|argument| argument == "--test");
     let size = if testing { 64 } else { 256 };
@@ -46,7 +46,7 @@ pub(crate) fn benches(criterion: &mut Criterion) {
     }
 }
 
-/// The same bits for everyone, and warm buffers.
+/// The bits in every method's form, and warm buffers.
 struct Prepared {
     grid: BitGrid,
     masks: Vec<u8>,
@@ -57,7 +57,7 @@ struct Prepared {
 
 impl Prepared {
     /// # Panics
-    /// Where not everyone gives the same masks.
+    /// If the methods' masks differ.
     fn new(field: Field, size: u32) -> Self {
         let distances = field.distances(size);
         let samples = Samples::new(Shape::cube(size).expect("it is small"), &distances).expect("a cube of distances");

@@ -1,6 +1,6 @@
-//! Shifts, boolean operations, morphology and automata, beside copying the grid, on 256³ points of caves.
+//! Shifts, boolean operations, morphology and automata on 256³ points of caves, compared with a copy of the grid.
 //!
-//! All write into a grid that is there. What each takes should be judged by `copy` of the same run.
+//! All of them write into an existing grid. Compare each time with `copy` of the same run.
 
 use std::{hint::black_box, time::Duration};
 

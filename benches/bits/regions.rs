@@ -1,15 +1,15 @@
 //! Flood fill and components.
 //!
-//! On caves of 256³ points, each of six neighbours. The peers:
-//! - a plain fill with a queue of points over bytes, one byte a point for the mask and one for what is filled; for the
-//!   components, one fill after the other, whose points are counted;
-//! - `ndarray-ndimage` (0.6): `label`, which is a pass over rows of points and one over labels. To fill from a seed,
-//!   the label of the seed is looked for among the others then.
+//! The field is caves of 256³ points with six neighbours each. The peers:
+//! - a plain fill with a queue of points over bytes: one byte per point for the mask, and one for the filled points.
+//!   For the components, it fills one after another and counts their points;
+//! - `ndarray-ndimage` (0.6): `label`, a pass over rows of points and a pass over labels. A fill from a seed then looks
+//!   for all points with the seed's label.
 //!
-//! No crate was found that fills a volume of bits. Others that were looked at: `building_blocks_search` (0.7.1, not
-//! maintained), whose `von_neumann_flood_fill3` takes 1.6 times as long as `label`; `scirs2-ndimage`, which labels
-//! point by point through a hash map; `fovea` and `imageproc`, which know images in two dimensions; graph crates
-//! (`petgraph`, `pathfinding`), to which every point is a node.
+//! No crate was found that fills a volume of bits. Other candidates: `building_blocks_search` (0.7.1, not maintained),
+//! whose `von_neumann_flood_fill3` takes 1.6 times as long as `label`; `scirs2-ndimage`, which labels point by point
+//! through a hash map; `fovea` and `imageproc`, which handle images in two dimensions; graph crates (`petgraph`,
+//! `pathfinding`), for which every point is a node.
 
 use std::{collections::VecDeque, hint::black_box, time::Duration};
 
@@ -35,7 +35,7 @@ pub(crate) fn benches(criterion: &mut Criterion) {
     let components = grid.components(Connectivity::Six);
     let largest = components.largest().and_then(|index| components.get(index)).expect("there are caves");
     let seed = largest.first;
-    // All do the same.
+    // All methods agree.
     assert_eq!(label::<u32>(&volume, &star).1, components.len());
     assert_eq!(queue_components(&mask, n).len(), components.len());
     assert_eq!(queue_flood(&mask, n, shape.index(seed)).iter().filter(|&&filled| filled == 1).count(), largest.size);
@@ -78,14 +78,14 @@ fn group<'a>(criterion: &'a mut Criterion, name: &str) -> BenchmarkGroup<'a, Wal
     group
 }
 
-/// What a queue reaches from a point, a byte each.
+/// The points that a fill with a queue reaches from a point, a byte each.
 fn queue_flood(mask: &[u8], n: usize, seed: usize) -> Vec<u8> {
     let mut visited = vec![0; mask.len()];
     fill(mask, n, seed, &mut visited, &mut VecDeque::new());
     visited
 }
 
-/// The sizes of all components.
+/// The sizes of all components, by fills with a queue.
 fn queue_components(mask: &[u8], n: usize) -> Vec<usize> {
     let (mut visited, mut queue, mut sizes) = (vec![0; mask.len()], VecDeque::new(), Vec::new());
     for point in 0..mask.len() {
@@ -96,7 +96,7 @@ fn queue_components(mask: &[u8], n: usize) -> Vec<usize> {
     sizes
 }
 
-/// Fills from a point; returns how many points that are.
+/// Fills from a point; returns the number of filled points.
 fn fill(mask: &[u8], n: usize, seed: usize, visited: &mut [u8], queue: &mut VecDeque<u32>) -> usize {
     let mut count = 0;
     visited[seed] = 1;

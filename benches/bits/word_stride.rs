@@ -1,27 +1,29 @@
-//! The peer: cell masks by word strides, after the article on building them that reports 143 ms for 256³ of white noise
-//! and 84 ms for five octaves of simplex noise (one thread of an AMD FX-8350; neither title nor author has come down
-//! with it). An implementation of our own, in its layout and with its passes.
+//! The peer: cell masks by word strides, reimplemented with the layout and the passes of an article on building cell
+//! masks.
 //!
-//! Signs lie in 32-bit words along one axis, here x; masks of eight cells in a 64-bit word. There are four passes, one
-//! for each edge of a cell along x. A pass goes through all rows of cells, block by block; each set bit of the block's
-//! word sets a bit in the masks of the two cells that share that corner. Those of the block are gathered in four local
-//! words; the cell in front of the block is written to directly. The first pass assigns, the others skip words without
-//! a bit and write what has changed.
+//! The article (its title and author are not known) reports 143 ms for 256³ of white noise and 84 ms for five octaves
+//! of simplex noise, on one thread of an AMD FX-8350.
 //!
-//! The article's axes are called z, y and x from the innermost out; ours are x, y and z. With that, its order of
-//! corners (innermost axis first) is [`Corner`](marchless::cell::Corner)'s.
+//! Signs lie in 32-bit words along one axis, here x; a 64-bit word holds the masks of eight cells. There are four
+//! passes, one for each edge of a cell along x. A pass goes through all rows of cells, block by block. Each set bit of
+//! the block's word sets a bit in the masks of the two cells that share that corner. The masks of the block are
+//! gathered in four local words; the cell before the block is written directly. The first pass assigns; the others skip
+//! words without a set bit and write only changes.
+//!
+//! The article names its axes z, y and x from the innermost outwards; here they are x, y and z. So its order of corners
+//! (innermost axis first) is that of [`Corner`](marchless::cell::Corner).
 
 use marchless::bits::BitGrid;
 
 /// Bits in a word of signs.
 const STRIDE: usize = 32;
-/// Words with the masks of as many cells.
+/// The number of words that hold the masks of so many cells.
 const LOCAL: usize = STRIDE / 8;
 
-/// Signs of a cube, and where the masks of its cells go.
+/// The signs of a cube, and the masks of its cells.
 pub(crate) struct WordStride {
     size: usize,
-    /// Words a row.
+    /// Words per row.
     blocks: usize,
     signs: Vec<u32>,
     masks: Vec<u64>,
@@ -76,11 +78,11 @@ impl WordStride {
     }
 }
 
-/// One word of signs: to the masks of its own cells and to the last of those before it.
+/// Adds one word of signs to the masks of its own cells and of the cell before them.
 #[inline(always)]
 fn edge_line<const M: u32>(line: u32, is_last: bool, before: Option<&mut [u64; LOCAL]>, line_masks: &mut [u64; LOCAL]) {
     let mut local = [0u64; LOCAL];
-    // Unrolled, as the article's is.
+    // Unrolled, as in the article.
     macro_rules! edges {
         ($($word:tt [$($bit:tt)*])*) => { $($(
             if line & 1 << (8 * $word + $bit) != 0 {

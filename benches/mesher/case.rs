@@ -1,18 +1,18 @@
-//! One field of one size, our mesher on it, and the judge of its mesh.
+//! [`Case`]: one field of one size, with our mesher and `MeshReport` on it.
 
 use core::{cell::OnceCell, hint::black_box};
 
 use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
 use marchless_benches::Field;
 
-/// A field to mesh; sampled when it is first asked for.
+/// A field to mesh; sampled at first use.
 pub(crate) struct Case {
     pub(crate) field: Field,
     /// Samples per axis, padding included.
     pub(crate) size: u32,
-    /// What the table says of its size.
+    /// The size as the table shows it.
     pub(crate) extent: String,
-    /// The paper's milliseconds for as many cells.
+    /// The paper's milliseconds for this number of cells.
     pub(crate) paper: Option<&'static str>,
     distances: OnceCell<Vec<f32>>,
 }
@@ -32,17 +32,17 @@ impl Case {
         format!("{} {}", self.field.name(), self.extent)
     }
 
-    /// How many times criterion looks. A round of white noise at 256³ takes seconds.
+    /// The number of criterion's samples. A round of white noise at 256³ takes seconds.
     pub(crate) const fn sample_size(&self) -> usize {
         if self.size < 128 { 20 } else { 10 }
     }
 
-    /// `[size³]`, x fastest, in voxels.
+    /// The distances, `[size³]`, x fastest, in voxels.
     pub(crate) fn distances(&self) -> &[f32] {
         self.distances.get_or_init(|| self.field.distances(self.size))
     }
 
-    /// The same as weights.
+    /// The distances as weights.
     pub(crate) fn weights<W: Weight>(&self) -> Vec<W> {
         self.distances().iter().map(|&distance| W::from_voxels(distance)).collect()
     }
@@ -58,7 +58,7 @@ impl Case {
         }
     }
 
-    /// The judge on our mesh of the `f32` samples: each call examines it once, and counts the triangles.
+    /// `MeshReport` on our mesh of the `f32` samples: each call checks it once, and counts the triangles.
     pub(crate) fn report(&self) -> impl FnMut() -> usize + use<> {
         let (shape, mut mesh) = (Shape::cube(self.size).expect("the sizes are small"), MeshBuffer::new());
         let samples = Samples::new(shape, self.distances()).expect("one weight a sample").padded();

@@ -1,26 +1,26 @@
 //! The mesher and its peers on the same samples of the same fields in one run: one thread, warm buffers.
 //!
-//! All boxes have a layer of padding, as chunks have: 35³ samples are 32³ cells. Everyone makes positions, normals and
-//! indices. What differs:
+//! All boxes have a layer of padding, as chunks have: 35³ samples are 32³ cells. All meshers make positions, normals
+//! and indices. They differ as follows:
 //!
 //! - fast-surface-nets reads `[1; 3]..[size − 2; 3]` of the padded samples, through a shape known at compile time; its
-//!   normals are not of length 1, and it leaves the faces on one side of each border to the neighbour. It is timed as
-//!   it is, and with a pass that normalises its normals; ours are timed with normals, and without.
-//! - isomesh (marching cubes) and isosurface (0.0.4, marching cubes) ask a function for each sample; see `peers.rs`.
-//! - For fields without a surface, reading the samples once (all of them, xor) is what nobody can undercut by much.
+//!   normals are not of length 1, and it leaves the faces on one side of each border to the neighbour. It is timed
+//!   unchanged, and with a pass that normalises its normals; ours is timed with and without normals.
+//! - isomesh (marching cubes) and isosurface (0.0.4, marching cubes) call a function for each sample; see `peers.rs`.
+//! - For fields without a surface, reading all samples once (xor) is close to the lower bound for any mesher.
 //!
 //! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the
-//! default, and on terrain and caves of any size `MeshReport` examines the mesh, on as many threads as there are
-//! processors. Up to 128³, these alone take less than a minute:
+//! default. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread per processor. Up to 128³,
+//! these alone take less than a minute:
 //!
 //! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear)?$|MeshReport)'`
 //!
 //! Terrains of 1³ to 50³ cells are those of William Svoboda, "Improving the Marching Cubes Algorithm for Use in
-//! Deformable 3D Terrain", table 1, whose times (C#, an Intel Core i5 of 3.5 GHz, no shared vertices) the table repeats
-//! for scale: another machine, another terrain.
+//! Deformable 3D Terrain", table 1. The table repeats the paper's times (C#, an Intel Core i5 of 3.5 GHz, no shared
+//! vertices) for scale only: machine and terrain differ.
 //!
-//! `cargo bench -p marchless_benches --bench mesher` runs for some seven minutes and ends with a table; names after
-//! `--` filter as ever, and the table shows what ran. With `MARCHLESS_RECORD=1` in the environment the table is also
+//! `cargo bench -p marchless_benches --bench mesher` runs for about seven minutes and ends with a table. Names after
+//! `--` filter as usual; the table shows what ran. With `MARCHLESS_RECORD=1` in the environment, the table is also
 //! written to `record/`, under the processor's name. Times are the least of 20 samples (10 from 128³ on).
 
 mod case;
@@ -49,7 +49,7 @@ fn main() -> ExitCode {
         threads::work();
         return ExitCode::SUCCESS;
     }
-    // As criterion itself decides: without `--bench`, it is `cargo test` that calls.
+    // Criterion's own rule: without `--bench`, the caller is `cargo test`.
     let testing =
         !env::args().any(|argument| argument == "--bench") || env::args().any(|argument| argument == "--test");
     let filtered = env::args().skip(1).any(|argument| !argument.starts_with('-'));
@@ -78,7 +78,7 @@ fn main() -> ExitCode {
     record::report(&results, threads.as_ref())
 }
 
-/// Everyone on one field of one size.
+/// All meshers on one field of one size.
 fn fields(criterion: &mut Criterion, results: &mut Results, case: &Case) {
     let mut group = open(criterion, case);
     ours::<i8>(&mut group, results, case);
@@ -121,8 +121,8 @@ fn open<'a>(criterion: &'a mut Criterion, case: &Case) -> BenchmarkGroup<'a, Wal
     group
 }
 
-/// Ours on weights of type `W`; on fields of noise with either topology, and where there is no surface, also what it
-/// takes only to read them.
+/// Ours on weights of type `W`: with both topologies on fields of noise, and beside a mere read of the weights on
+/// fields without a surface.
 fn ours<W: Measured>(group: &mut BenchmarkGroup<'_, WallTime>, results: &mut Results, case: &Case) {
     results.measure(group, case, Subject::Ours(W::NAME), || case.ours::<W>(MeshSettings::default()));
     if matches!(case.field, Field::Terrain | Field::Caves | Field::WhiteNoise) && [35, 64, 128].contains(&case.size) {

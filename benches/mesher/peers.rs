@@ -1,14 +1,14 @@
-//! The peers behind one shape of call: each takes the samples once, and then meshes them again and again into warm
-//! buffers, counting triangles.
+//! The peers behind one interface: each takes the samples once, and then meshes them repeatedly into warm buffers and
+//! counts triangles.
 //!
-//! isomesh and isosurface know no arrays: they ask a function for the value at a position. Both ask for the lattice
-//! points in order, x fastest, each once, so the function hands out the next sample of a copy without padding: no
-//! position is turned into an index. For the normal at a vertex they ask at its position; they get central differences
-//! at the nearest sample, the least that a table of samples can give (ours interpolate between the edge's two ends).
-//! isomesh normalises them; for isosurface, which does not, the function does.
+//! isomesh and isosurface accept no arrays: they call a function for the value at a position. Both request the lattice
+//! points in order, x fastest, each once. So the function returns the next sample of a copy without padding, and no
+//! position is turned into an index. For the normal at a vertex they call at its position, and get central differences
+//! at the nearest sample: the cheapest that a table of samples can give (ours interpolate between the edge's two ends).
+//! isomesh normalises them. isosurface does not, so the function does.
 //!
-//! isosurface meshes one layer of cells more than it is asked for (it gets the padding there), and shares only about
-//! half of the vertices that could be. Its 0.1.0-alpha.0 shares all, and takes 4 to 50 times as long.
+//! isosurface meshes one layer of cells more than requested (it gets the padding there), and shares only about half of
+//! the vertices that could be shared. Its version 0.1.0-alpha.0 shares all, and takes 4 to 50 times as long.
 
 use core::cell::Cell;
 
@@ -26,7 +26,7 @@ use isosurface::{
 
 use crate::case::Case;
 
-/// An `i8` weight as fast-surface-nets wants it, in steps.
+/// An `i8` weight in steps, as fast-surface-nets expects it.
 #[derive(Clone, Copy)]
 pub(crate) struct Steps(pub(crate) i8);
 
@@ -74,7 +74,7 @@ fn nets_of_shape<T: SignedDistance>(
     surface_nets(core::hint::black_box(samples), shape, [1; 3], [size - 2; 3], mesh);
 }
 
-/// isomesh's marching cubes, as it comes.
+/// isomesh's marching cubes, unchanged.
 pub(crate) fn isomesh(case: &Case) -> impl FnMut() -> usize + use<> {
     let samples = InOrder::new(case);
     let shape = RuntimeShape3::new([case.size - 2; 3]).expect("the sizes are small");
@@ -102,7 +102,7 @@ pub(crate) fn isosurface(case: &Case) -> impl FnMut() -> usize + use<> {
     }
 }
 
-/// Samples handed out one after the other to those who ask in order.
+/// A source that returns its samples one after another, for callers that request them in order.
 struct InOrder {
     /// Samples per axis, padding included.
     size: usize,
@@ -172,7 +172,7 @@ impl HermiteSource for InOrder {
     }
 }
 
-/// The vector at length 1.
+/// The vector scaled to length 1.
 #[inline]
 fn unit([x, y, z]: [f32; 3]) -> [f32; 3] {
     let length = (x * x + y * y + z * z).sqrt();

@@ -1,4 +1,4 @@
-//! The report: the table with the machine's name, printed, and written down if asked.
+//! The report: the table with the machine's name, printed, and recorded on request.
 
 use std::{env, fs, path::Path, process::Command, process::ExitCode, thread};
 
@@ -6,7 +6,7 @@ use marchless::Backend;
 
 use crate::{results::Results, threads::Threads};
 
-/// Prints the table, and writes it to `record/` where `MARCHLESS_RECORD=1` asks for it.
+/// Prints the table, and writes it to `record/` if `MARCHLESS_RECORD=1`.
 pub(crate) fn report(results: &Results, threads: Option<&Threads>) -> ExitCode {
     let processor = processor();
     let report = text(&processor, results, threads);

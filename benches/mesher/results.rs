@@ -1,6 +1,6 @@
-//! What was measured: the least times, and the table that they make.
+//! The results: the least times, and their table.
 //!
-//! The least of some samples, each the mean of a batch: whatever else the machine does only ever adds to a time.
+//! A time is the least of some samples, each the mean of a batch, since other work of the machine only adds to a time.
 
 use core::{fmt, hint::black_box};
 use std::time::Instant;
@@ -11,12 +11,12 @@ use marchless_benches::aligned;
 
 use crate::case::Case;
 
-/// Who meshes what.
+/// A mesher with its kind of weights, or another measured task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subject {
     /// Ours with normals, on weights of this name.
     Ours(&'static str),
-    /// The same with `Topology::Trilinear`.
+    /// Ours with `Topology::Trilinear`, on weights of this name.
     Trilinear(&'static str),
     /// `MeshReport` on our mesh of the `f32` samples.
     Report,
@@ -24,13 +24,13 @@ pub(crate) enum Subject {
     Bare,
     /// fast-surface-nets on `f32`.
     Nets,
-    /// The same, and its normals normalised.
+    /// fast-surface-nets on `f32`, with normals normalised.
     NetsNormalised,
     /// fast-surface-nets on `i8`.
     NetsI8,
     Isosurface,
     Isomesh,
-    /// Nobody meshes: the weights are only read.
+    /// No mesher: the weights of this name are only read.
     Reading(&'static str),
 }
 
@@ -51,11 +51,11 @@ impl fmt::Display for Subject {
     }
 }
 
-/// A weight that can be named, and read without meshing.
+/// A weight with a name for the table, and a way to read all weights without meshing.
 pub(crate) trait Measured: Weight {
     const NAME: &'static str;
 
-    /// All samples in one number.
+    /// All weights combined in one number.
     fn read(weights: &[Self]) -> usize;
 }
 
@@ -100,9 +100,9 @@ impl Results {
         self.0.is_empty()
     }
 
-    /// Lets criterion time `subject`, and keeps the least time. `prepare` runs only if a filter lets the subject
-    /// through; what it makes runs once a call, and returns a number that cannot be had without the work: the
-    /// triangles, of meshers.
+    /// Lets criterion time `subject`, and keeps the least time. `prepare` runs only if the filter selects the subject.
+    /// Each call of its result does the work once, and returns a number that depends on the work: for meshers, that of
+    /// the triangles.
     pub(crate) fn measure<R: FnMut() -> usize>(
         &mut self,
         group: &mut BenchmarkGroup<'_, WallTime>,
@@ -135,10 +135,11 @@ impl Results {
         }
     }
 
-    /// Both mesh the same cells of the same samples by marching cubes, so that their triangles are as many.
+    /// Checks that two subjects make equally many triangles, since both mesh the same cells of the same samples by
+    /// marching cubes.
     ///
     /// # Panics
-    /// If they are not.
+    /// If the numbers differ.
     pub(crate) fn check_same_triangles(&self, case: &Case, one: Subject, other: Subject) {
         let find = |subject| self.find(case.field.name(), &case.extent, subject).map(|result| result.triangles);
         if let (Some(ours), Some(theirs)) = (find(one), find(other)) {
@@ -150,7 +151,7 @@ impl Results {
         self.0.iter().find(|result| (result.case.0, &*result.case.1, result.subject) == (field, extent, subject))
     }
 
-    /// A row for each of ours: times, and by what factor each peer takes longer.
+    /// The table, with a row for each of ours: times, and the factor by which each peer takes longer.
     pub(crate) fn table(&self) -> String {
         let mut rows = vec![
             [
@@ -211,13 +212,13 @@ impl Results {
     }
 }
 
-/// The middle one, or `None` of none.
+/// The median; `None` if there are no values.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
 
-/// A time with three digits or so.
+/// A time with about three digits.
 pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
         ..1e-4 => format!("{:.1} µs", seconds * 1e6),

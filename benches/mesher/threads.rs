@@ -1,7 +1,7 @@
-//! Many chunks on two threads, beside one thread and two independent processes.
+//! Many chunks on two threads, compared with one thread and two independent processes.
 //!
-//! A worker has chunks, a mesher and a buffer of its own, and meshes all of its chunks some times over. The three ways
-//! take turns, so that what else the machine does meets them alike; two workers take as long as the slower one.
+//! A worker has its own chunks, mesher and buffer, and meshes all of its chunks several times. The three ways take
+//! turns, so that other work of the machine affects them alike. The time of two workers is that of the slower one.
 
 use core::fmt;
 use std::{
@@ -18,22 +18,22 @@ use marchless_benches::Field;
 
 use crate::results::{duration, median};
 
-/// The variable that makes this program a worker; it holds the chunks per axis.
+/// The environment variable that makes this program a worker; its value is the number of chunks per axis.
 pub(crate) const WORKER: &str = "MARCHLESS_BENCH_WORKER";
 /// Samples and cells of a chunk per axis.
 const SAMPLES: usize = 35;
 const CELLS: usize = 32;
-/// How often a worker meshes its chunks in one round.
+/// The number of times that a worker meshes its chunks in one round.
 const PASSES: usize = 10;
 
-/// What one chunk takes in each of the three ways, per worker.
+/// The times of the three ways, per worker.
 pub(crate) struct Threads {
     chunks: usize,
     /// Seconds for all passes over all chunks: medians of all rounds.
     one_thread: f64,
     two_threads: f64,
     two_processes: f64,
-    /// The median over rounds of what two threads do in the time of two processes, and of one thread.
+    /// The median over rounds of the speed of two threads relative to two processes, and to one thread.
     of_processes: f64,
     of_one: f64,
 }
@@ -82,7 +82,7 @@ pub(crate) fn measure(per_axis: usize, rounds: usize) -> Threads {
     }
 }
 
-/// What a process does that was started as a worker: a round for each line that comes in, answered with its seconds.
+/// Runs this process as a worker: each line of input starts a round, and the answer is its time in seconds.
 pub(crate) fn work() {
     let per_axis = env::var(WORKER).ok().and_then(|value| value.parse().ok()).expect("the number of chunks per axis");
     let mut worker = Worker::new(per_axis);
@@ -93,7 +93,7 @@ pub(crate) fn work() {
     }
 }
 
-/// The time of the slower one.
+/// The time of the slower of two workers on two threads.
 fn on_two_threads(first: &mut Worker, second: &mut Worker) -> f64 {
     let barrier = Barrier::new(2);
     let round = |worker: &mut Worker| {
@@ -113,7 +113,7 @@ struct Worker {
 }
 
 impl Worker {
-    /// A warm worker.
+    /// A worker with warm buffers.
     fn new(per_axis: usize) -> Self {
         let size = per_axis * CELLS + SAMPLES - CELLS;
         let samples = Field::Caves.distances(size as u32);
@@ -130,7 +130,7 @@ impl Worker {
         worker
     }
 
-    /// Meshes all chunks, [`PASSES`] times; how many seconds it took.
+    /// Meshes all chunks [`PASSES`] times. Returns the time in seconds.
     fn round(&mut self) -> f64 {
         let (shape, settings) = (Shape::cube(SAMPLES as u32).expect("it is small"), MeshSettings::default());
         let start = Instant::now();
@@ -181,7 +181,7 @@ impl Process {
 impl Drop for Process {
     fn drop(&mut self) {
         self.input = None;
-        // Nothing is to be done about a worker that failed after its last answer.
+        // A worker's failure after its last answer does not matter.
         let _ = self.child.wait();
     }
 }

@@ -2,9 +2,9 @@
 //! the chunks that it touched, and inserts their new meshes.
 //!
 //! The terrain is the default one of 8 × 4 × 8 chunks of 32 cells, filled with hills. Each stroke digs a ball into the
-//! surface and fills it again, so that the terrain stays as it is. Beside it stands an update in which nothing happens.
+//! surface and fills it again, so that the terrain does not change. An update without any change is measured, too.
 //!
-//! And the ray that finds the ground for it, in an endless world of which a viewer sees 8 chunks far.
+//! The bench also measures the ray that finds the ground, in an endless world with a view of 8 chunks.
 
 use std::hint::black_box;
 
@@ -18,7 +18,7 @@ use bevy_mesh::{Mesh3d, MeshPlugin};
 use bevy_transform::{TransformPlugin, components::Transform};
 use criterion::{Criterion, criterion_group, criterion_main};
 
-/// Where the ball is dug, in voxels: in the middle of a chunk, and where eight chunks meet.
+/// The places of the ball, in voxels: in the middle of a chunk, and where eight chunks meet.
 const PLACES: [(&str, [f32; 2]); 2] =
     [("within one column of chunks", [112.0, 112.0]), ("where columns meet", [128.0, 128.0])];
 

@@ -1,7 +1,7 @@
-//! The fields that everyone meshes: small, of many kinds, and reproducible.
+//! The fields that all meshers mesh: small, of many kinds, and reproducible.
 //!
-//! Values below 0 are inside. Each field is a cube of 8 to 33 samples per axis whose outermost layer is outside, so
-//! that a right mesh is closed.
+//! Values below 0 are inside. Each field is a cube of 8 to 33 samples per axis. Its outermost layer is outside, so that
+//! a correct mesh is closed.
 
 use marchless_benches::split_mix;
 use noise::{NoiseFn, Perlin};
@@ -9,7 +9,7 @@ use noise::{NoiseFn, Perlin};
 /// Samples to mesh.
 pub(crate) struct Field {
     pub(crate) kind: Kind,
-    /// Which one of its kind.
+    /// The field's number among those of its kind.
     pub(crate) number: usize,
     /// Samples per axis.
     pub(crate) size: usize,
@@ -17,7 +17,7 @@ pub(crate) struct Field {
     pub(crate) samples: Vec<f32>,
 }
 
-/// What a field consists of, its outermost layer aside.
+/// The kind of a field's samples, except for its outermost layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Signs,
@@ -64,7 +64,7 @@ impl Kind {
         Self::NotANumber,
     ];
 
-    /// What reports call it.
+    /// The name in reports.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Signs => "signs",
@@ -89,7 +89,7 @@ impl Kind {
         }
     }
 
-    /// What its samples are, in a sentence.
+    /// A sentence that describes the samples.
     pub(crate) const fn description(self) -> &'static str {
         match self {
             Self::Signs => "−1 or 1 at random, few or many inside",
@@ -114,7 +114,7 @@ impl Kind {
         }
     }
 
-    /// A value outside of about the magnitude that the others have.
+    /// An outside value of about the same magnitude as the other samples.
     const fn outside(self) -> f32 {
         match self {
             Self::Bytes => 127.0,
@@ -125,7 +125,7 @@ impl Kind {
     }
 }
 
-/// `per_kind` fields of each kind, of at most `largest` samples per axis; always the same ones.
+/// `per_kind` fields of each kind, with at most `largest` samples per axis; the same ones on every call.
 pub(crate) fn all(per_kind: usize, largest: usize) -> Vec<Field> {
     let numbers = |kind| (0..per_kind).map(move |number| Field::new(kind, number, largest));
     Kind::ALL.into_iter().flat_map(numbers).collect()
@@ -156,7 +156,7 @@ impl Field {
         self.samples[(z * self.size + y) * self.size + x]
     }
 
-    /// Whether there is a surface: some sample below 0.
+    /// True if there is a surface: a sample below 0.
     pub(crate) fn has_surface(&self) -> bool {
         self.samples.iter().any(|&sample| sample < 0.0)
     }
@@ -167,7 +167,8 @@ impl Field {
     }
 }
 
-/// What a kind's samples are at a lattice point inside the outermost layer. `size`: samples per axis.
+/// A function that returns the samples of a kind at lattice points inside the outermost layer. `size`: samples per
+/// axis.
 fn sampler(kind: Kind, number: usize, size: f64, mut random: Random) -> Box<dyn FnMut([f64; 3]) -> f32> {
     match kind {
         Kind::Signs => {
@@ -298,17 +299,17 @@ fn smooth_noise(number: usize, random: &mut Random) -> impl Fn([f64; 3]) -> f64 
     move |p| noise.get([0, 1, 2].map(|axis| p[axis] / length + origin[axis])) - level
 }
 
-/// The union of what has a value each.
+/// The union of parts: the least of their values.
 fn least<T>(parts: &[T], value: impl Fn(&T) -> f64) -> f32 {
     parts.iter().map(value).fold(f64::INFINITY, f64::min) as f32
 }
 
-/// The square of the distance.
+/// The square of the distance of two points.
 fn squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum()
 }
 
-/// A sequence of numbers at random, and where it is.
+/// A sequence of random numbers, at its current place.
 struct Random(u64);
 
 impl Random {
@@ -317,12 +318,12 @@ impl Random {
         split_mix(self.0)
     }
 
-    /// From 0 to 1.
+    /// A number from 0 to 1.
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// From −1 to 1.
+    /// A number from −1 to 1.
     fn white(&mut self) -> f32 {
         self.between(-1.0, 1.0) as f32
     }

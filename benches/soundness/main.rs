@@ -1,14 +1,15 @@
-//! What is sound in the meshes of marchless and of its peers, and what is not: everyone meshes the same 304 small
-//! fields of 19 kinds, with ties, NaN and all magnitudes among them ([`fields`]), as their documentation says
-//! ([`peers`]), and [`MeshReport`](marchless::MeshReport) judges the meshes.
+//! The soundness of the meshes of marchless and of its peers.
 //!
-//! `cargo bench -p marchless_benches --bench soundness` prints the tables after some two minutes, and which meshes of
-//! ours are not clean, if any; with `MARCHLESS_RECORD=1` in the environment the tables are also written to
+//! All meshers mesh the same 304 small fields of 19 kinds, including ties, NaN and all magnitudes ([`fields`]), as
+//! their documentation says ([`peers`]). [`MeshReport`](marchless::MeshReport) judges the meshes.
+//!
+//! `cargo bench -p marchless_benches --bench soundness` prints the tables after about two minutes, and lists our meshes
+//! that are not clean, if any. With `MARCHLESS_RECORD=1` in the environment, the tables are also written to
 //! `record/soundness.md`. `cargo test` runs it on a few small fields, and fails if a mesh of ours is not clean.
 //!
 //! `--write DIR` after `--` only writes the fields to `DIR/fields`, one file each: samples as little-endian `f32`, x
-//! fastest. `--judge DIR` judges the meshes in `DIR/meshes` too, a folder for each extractor, a file for each field
-//! ([`Mesh::read`]). `benches/peers/soundness.py` does both for extractors that Python packages offer.
+//! fastest. `--judge DIR` also judges the meshes in `DIR/meshes`, with a folder for each extractor and a file for each
+//! field ([`Mesh::read`]). `benches/peers/soundness.py` does both for extractors from Python packages.
 
 mod fields;
 mod mesh;
@@ -40,7 +41,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> io::Result<ExitCode> {
-    // As criterion decides: without `--bench`, it is `cargo test` that calls.
+    // Criterion's own rule: without `--bench`, the caller is `cargo test`.
     if !env::args().any(|argument| argument == "--bench") {
         let (_, unclean) = judge_all(&fields::all(1, 16), None)?;
         tell(&unclean);
@@ -71,7 +72,7 @@ fn write(fields: &[Field], folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Everyone's tallies, and what is wrong with meshes of ours. `folder`: where there are meshes that others made.
+/// The tallies of all meshers, and the defects of our meshes. `folder` has the meshes of other extractors.
 fn judge_all(fields: &[Field], folder: Option<&Path>) -> io::Result<(Vec<Tally>, Vec<String>)> {
     let (mut tallies, mut unclean) = (Vec::new(), Vec::new());
     let hook = panic::take_hook();
@@ -105,7 +106,7 @@ fn folders(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(folders)
 }
 
-/// Tells what is wrong with ours.
+/// Prints the defects of our meshes.
 fn tell(unclean: &[String]) {
     for mesh in unclean {
         eprintln!("not clean: {mesh}");

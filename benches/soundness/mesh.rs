@@ -1,4 +1,4 @@
-//! A mesh as it is judged, and its file.
+//! [`Mesh`]: a mesh to be judged, and its file format.
 
 use std::{collections::HashMap, fs, io, path::Path};
 
@@ -9,7 +9,7 @@ pub(crate) struct Mesh {
 }
 
 impl Mesh {
-    /// The same with vertices made one where they are at most 1/65536 apart along each axis, some up to twice as far.
+    /// The mesh with nearby vertices merged: those at most 1/65536 apart along each axis, and some up to twice as far.
     pub(crate) fn welded(self) -> Self {
         let mut same: Vec<usize> = (0..self.positions.len()).collect();
         // Close ones are in the same cell of at least one of these grids, each shifted by half a cell along some axes.
@@ -39,10 +39,10 @@ impl Mesh {
     }
 
     /// Reads a file of little-endian words: the number of vertices, three `f32` for each, and three `u32` for each
-    /// triangle. Nothing where there is no such file, since its maker had no mesh.
+    /// triangle. `None` if there is no such file, since its maker had no mesh.
     ///
     /// # Errors
-    /// Where the file cannot be read, or is not such a file.
+    /// If the file cannot be read or has another format.
     pub(crate) fn read(path: &Path) -> io::Result<Option<Self>> {
         let bytes = match fs::read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -63,7 +63,7 @@ impl Mesh {
     }
 }
 
-/// The first of those that are the same as `index`.
+/// The first of the vertices that are merged with `index`.
 fn root(same: &mut [usize], mut index: usize) -> usize {
     while same[index] != index {
         same[index] = same[same[index]];

@@ -1,12 +1,12 @@
-//! Everyone who meshes the fields, each as its documentation says.
+//! All meshers of the fields, each used as its documentation says.
 //!
-//! - All get the same samples and mesh at 0; samples below 0 are inside (transvoxel, for which larger is inside, gets
+//! - All get the same samples and mesh at 0. Samples below 0 are inside (transvoxel, for which larger is inside, gets
 //!   them negated).
-//! - fast-surface-nets leaves the faces on one side to the neighbour; it gets one more layer outside there.
-//! - isomesh, isosurface and transvoxel ask a function for values at positions. At lattice points it gives the
-//!   samples; between them, where isomesh asks for gradients, their trilinear interpolation.
-//! - isosurface shares only some of its vertices and mcubes none, and each cell computes its own positions. Vertices of
-//!   theirs are made one where they are the same but for rounding ([`Mesh::welded`]).
+//! - fast-surface-nets leaves the faces on one side to the neighbour, so it gets one more outside layer there.
+//! - isomesh, isosurface and transvoxel call a function for values at positions. It returns the samples at lattice
+//!   points, and their trilinear interpolation between them, where isomesh computes gradients.
+//! - isosurface shares only some of its vertices and mcubes none, and each cell computes its own positions. Their
+//!   vertices are merged if they differ only by rounding ([`Mesh::welded`]).
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -26,10 +26,10 @@ use transvoxel::prelude::{Block, FieldCaching, GenericMeshBuilder, TransitionSid
 
 use crate::{fields::Field, mesh::Mesh};
 
-/// Someone who meshes.
+/// A mesher.
 #[derive(Clone, Copy)]
 pub(crate) struct Peer {
-    /// Which crate, in which version, and which of its ways.
+    /// The crate, its version and its algorithm.
     pub(crate) name: &'static str,
     extract: fn(&Field) -> Option<Mesh>,
 }
@@ -59,7 +59,7 @@ impl Peer {
     ];
     pub(crate) const OURS: usize = 2;
 
-    /// Its mesh of a field; nothing where it refuses, or panics.
+    /// Its mesh of a field; `None` if it refuses or panics.
     pub(crate) fn mesh(self, field: &Field) -> Option<Mesh> {
         catch_unwind(AssertUnwindSafe(|| (self.extract)(field))).ok().flatten()
     }

@@ -1,4 +1,4 @@
-//! The report: what was meshed and what came of it, printed, and written down if asked.
+//! The report: the fields and the tables, printed, and recorded on request.
 
 use std::{env, fs, io, path::Path};
 
@@ -7,7 +7,7 @@ use crate::{
     tally::{Tally, fields_table, kinds_table, totals_table},
 };
 
-/// Prints the tables, and writes them to `record/` where `MARCHLESS_RECORD=1` asks for it.
+/// Prints the tables, and writes them to `record/` if `MARCHLESS_RECORD=1`.
 pub(crate) fn report(fields: &[Field], tallies: &[Tally]) -> io::Result<()> {
     let report = text(fields, tallies);
     println!("\n{report}");

@@ -1,4 +1,4 @@
-//! What is not sound in everyone's meshes, counted.
+//! [`Tally`]: counts of the flaws in a mesher's meshes.
 
 use marchless::MeshReport;
 use marchless_benches::aligned;
@@ -8,10 +8,10 @@ use crate::{
     mesh::Mesh,
 };
 
-/// A kind of flaw: its name, and how many a report tells of.
+/// A kind of flaw: its name, and its count in a report.
 type Flaw = (&'static str, fn(&MeshReport) -> usize);
 
-/// The flaws that are counted one by one, besides there being no mesh.
+/// The flaws that are counted one by one. A missing mesh is counted, too.
 const FLAWS: [Flaw; 8] = [
     ("open edges", |report| report.boundary_edges),
     ("non-manifold edges", |report| report.non_manifold_edges),
@@ -23,18 +23,19 @@ const FLAWS: [Flaw; 8] = [
     ("non-finite vertices", |report| report.non_finite_vertices),
 ];
 
-/// Someone's meshes of all fields, judged.
+/// The judged meshes of all fields by one mesher.
 pub(crate) struct Tally {
     name: String,
     fields: usize,
     triangles: usize,
     zero_area_triangles: usize,
-    /// Fields with any flaw, and those among them of each kind.
+    /// The number of fields with any flaw.
     flawed: usize,
+    /// The number of fields with any flaw, for each kind of field.
     flawed_of_kind: [usize; Kind::ALL.len()],
-    /// Fields without a mesh.
+    /// The number of fields without a mesh.
     none: usize,
-    /// Fields with each flaw, and how many of it in all of them.
+    /// For each flaw, the number of fields that have it, and its count in all fields.
     flaws: [(usize, usize); FLAWS.len()],
 }
 
@@ -52,7 +53,10 @@ impl Tally {
         }
     }
 
-    /// Judges the mesh of a field. What is wrong with it, if anything is.
+    /// Judges the mesh of a field.
+    ///
+    /// # Errors
+    /// A description of its flaws.
     pub(crate) fn judge(&mut self, field: &Field, mesh: Option<&Mesh>) -> Result<(), String> {
         self.fields += 1;
         let verdict = match mesh.filter(|mesh| !mesh.indices.is_empty() || !field.has_surface()) {
@@ -85,17 +89,17 @@ fn zero_area_triangles(report: &MeshReport) -> usize {
     report.repeated_index_triangles + report.zero_area_triangles
 }
 
-/// A table of in how many fields everyone's mesh has each flaw.
+/// A table of the number of fields with each flaw, for each mesher.
 pub(crate) fn fields_table(tallies: &[Tally]) -> String {
     table(tallies, "any", |tally| tally.flawed.to_string(), |&(fields, _)| fields.to_string())
 }
 
-/// A table of how many of each flaw there are in all fields together.
+/// A table of the count of each flaw in all fields, for each mesher.
 pub(crate) fn totals_table(tallies: &[Tally]) -> String {
     table(tallies, "triangles", |tally| tally.triangles.to_string(), |&(_, all)| all.to_string())
 }
 
-/// A table with a row for everyone, and columns for what `first` says, for each flaw, for there being no mesh and for
+/// A table with a row for each mesher, and columns for the result of `first`, for each flaw, for missing meshes and for
 /// the share of triangles without an area.
 fn table(
     tallies: &[Tally],
@@ -116,7 +120,7 @@ fn table(
     aligned(&rows)
 }
 
-/// A table of how many fields of each kind have any flaw, with a column for everyone, in their order.
+/// A table of the number of fields of each kind with any flaw, with a column for each mesher, in their order.
 pub(crate) fn kinds_table(tallies: &[Tally]) -> String {
     let numbers = (1..=tallies.len()).map(|number| number.to_string());
     let mut rows = vec![[vec!["field".to_owned()], numbers.collect()].concat()];

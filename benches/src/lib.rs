@@ -1,4 +1,4 @@
-//! The fields that benches mesh: they differ in how much surface there is, and in how it lies.
+//! The fields that benches mesh. They differ in the amount and the shape of their surface.
 
 mod table;
 
@@ -11,9 +11,9 @@ pub use table::aligned;
 /// A kind of field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
-    /// Air alone: what it costs to find out that there is nothing.
+    /// Air only: the cost of finding no surface.
     Empty,
-    /// Ground alone: nothing again, with every sign set.
+    /// Ground only: no surface either, with every sign set.
     Solid,
     /// A level plane.
     Plane,
@@ -23,12 +23,12 @@ pub enum Field {
     Terrain,
     /// Caverns all through the box, from five octaves of noise in three dimensions.
     Caves,
-    /// Every sample for itself: the most surface that there can be.
+    /// Independent samples: the most surface possible.
     WhiteNoise,
 }
 
 impl Field {
-    /// All of them, the ones with less surface first.
+    /// All fields, those with less surface first.
     pub const ALL: [Self; 7] =
         [Self::Empty, Self::Solid, Self::Plane, Self::Sphere, Self::Terrain, Self::Caves, Self::WhiteNoise];
 
@@ -45,8 +45,9 @@ impl Field {
         }
     }
 
-    /// Distances in voxels, `[size³]`, x fastest; the same on every call. Hills and caverns are as wide in all sizes; a
-    /// larger box holds more of them. All processors share the sampling: five octaves at 256³ take one some seconds.
+    /// Distances in voxels, `[size³]`, x fastest; the same on every call. Hills and caverns have the same width in all
+    /// sizes; a larger box holds more of them. All processors share the sampling: five octaves at 256³ would take a
+    /// single one some seconds.
     pub fn distances(self, size: u32) -> Vec<f32> {
         let middle = f64::from(size) / 2.0;
         match self {
@@ -74,7 +75,7 @@ impl Field {
     }
 }
 
-/// A distance for each of the `size³` lattice points, x fastest.
+/// The distances at all `size³` lattice points, x fastest.
 fn fill(size: u32, distance: impl Fn([u32; 3]) -> f64 + Sync) -> Vec<f32> {
     let layer = size as usize * size as usize;
     let mut distances = vec![0.0; layer * size as usize];

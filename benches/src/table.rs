@@ -1,6 +1,6 @@
 //! Tables for reports.
 
-/// A Markdown table whose columns are as wide as need be; the first row is its head, and all rows are as long.
+/// A Markdown table with aligned columns. The first row is the head; all rows have the same number of cells.
 pub fn aligned(rows: &[impl AsRef<[String]>]) -> String {
     let columns = rows.first().map_or(0, |row| row.as_ref().len());
     let width = |column: usize| rows.iter().map(|row| row.as_ref()[column].chars().count()).max().unwrap_or(0).max(3);

@@ -12,10 +12,10 @@ use crate::situation::{Bench, Row, above, updates_until};
 
 const VIEWERS: u32 = 32;
 
-/// Far enough apart that no two views share a chunk.
+/// The distance between viewers, so large that no two views share a chunk.
 const APART: f32 = 4_000.0;
 
-/// Where a viewer is, moved by so many voxels.
+/// The place of a viewer, moved by `shift` voxels.
 fn place(viewer: u32, shift: f32) -> Transform {
     above((viewer % 8) as f32 * APART + shift, (viewer / 8) as f32 * APART)
 }
@@ -58,33 +58,33 @@ pub(crate) fn walking(bench: &Bench) -> Vec<Row> {
     vec![step, walk]
 }
 
-/// A world in which 32 viewers appear with its first update.
+/// A world with 32 viewers that appear in its first update.
 fn crowd(bench: &Bench) -> (Game, Vec<(u32, Entity)>) {
     let mut game = bench.game(World::Hills.terrain());
     let viewers = (0..VIEWERS).map(|number| (number, spawn(&mut game, number))).collect();
     (game, viewers)
 }
 
-/// Adds the viewer of a number where it begins.
+/// Adds the viewer with a number at its start.
 fn spawn(game: &mut Game, number: u32) -> Entity {
     game.spawn_viewer(TerrainViewer::new(256.0), place(number, 0.0))
 }
 
-/// Runs updates, each after a change, and tells how many chunks waited in the end.
+/// Runs updates, each after a change. The row also shows how many chunks are pending in the end.
 fn row(name: &str, bench: &Bench, game: &mut Game, updates: u32, change: impl FnMut(&mut Game, u32)) -> Row {
     let times = game.updates(bench.count(updates), change);
     let waiting = game.volume().coverage().waiting;
     Row::new(name, times).with_figure(format!("{waiting} chunks waited in the end"))
 }
 
-/// Puts viewers so many voxels away from where they began.
+/// Moves viewers to `shift` voxels from their starts.
 fn move_all(game: &mut Game, viewers: &[(u32, Entity)], shift: f32) {
     for (number, viewer) in viewers {
         game.place(*viewer, place(*number, shift));
     }
 }
 
-/// 400 small terrains of their own extent, in a square, and 32 viewers among them; nothing happens.
+/// 400 small terrains with an extent, in a square, and 32 viewers among them; nothing changes.
 pub(crate) fn idle_terrains(bench: &Bench) -> Vec<Row> {
     let terrain = || {
         let ground = |[_, y, _]: [f64; 3]| y - 4.3;
@@ -104,7 +104,7 @@ pub(crate) fn idle_terrains(bench: &Bench) -> Vec<Row> {
     vec![Row::new("400 idle terrains, 32 idle viewers", times).with_figure(figure)]
 }
 
-/// Whether all terrains have settled.
+/// True if all terrains have settled.
 fn all_settled(game: &mut Game) -> bool {
     let mut volumes = game.app.world_mut().query::<&TerrainVolume>();
     volumes.iter(game.app.world()).all(TerrainVolume::is_settled)

@@ -1,4 +1,4 @@
-//! Edits of what is not loaded.
+//! Edits of chunks that are not loaded.
 
 use bevy_marchless::prelude::*;
 use bevy_math::DVec3;
@@ -31,7 +31,7 @@ fn scattered(number: u64) -> DVec3 {
     DVec3::new(random(0), random(1), random(2)) * DVec3::new(1_000.0, 30.0, 1_000.0)
 }
 
-/// The update that reads what has been written, and the 100 after it.
+/// The update that reads the stamps, and the 100 updates after it.
 fn update_and_after(bench: &Bench, game: &mut Game, what: &str) -> Vec<Row> {
     vec![
         Row::new(format!("{what}: its update"), game.updates(1, |_, _| {})),

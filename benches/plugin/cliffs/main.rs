@@ -1,8 +1,8 @@
-//! Situations in which a cost could grow with what is loaded, what waits or what was ever edited.
+//! Situations in which a cost could grow with the number of loaded chunks, of pending chunks, or of edits.
 //!
-//! Each runs in a headless app with mesh assets and default settings, sixty updates a second, while jobs sample and
-//! mesh on their threads. Measured is the CPU time of the main thread in the plugin's systems, their commands included,
-//! with a single-threaded executor for their schedule.
+//! Each runs in a headless app with mesh assets and default settings, at sixty updates a second, while jobs sample and
+//! mesh on their threads. The bench measures the CPU time of the main thread in the plugin's systems, including their
+//! commands, with a single-threaded executor for their schedule.
 //!
 //! ```text
 //! cargo bench -p marchless_plugin_benches --bench cliffs             # all of them, six minutes or more
@@ -24,7 +24,7 @@ use marchless_plugin_benches::{Request, machine, print_and_record, processor};
 
 use situation::{Bench, Row};
 
-/// All situations by name; each gives one or more rows.
+/// All situations by name; each returns one or more rows.
 const SITUATIONS: [(&str, fn(&Bench) -> Vec<Row>); 8] = [
     ("32 viewers come and go", crowd::coming_and_going),
     ("32 viewers walk", crowd::walking),

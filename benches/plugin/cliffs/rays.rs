@@ -11,7 +11,7 @@ use marchless_plugin_benches::{Times, World, thread_time};
 
 use crate::situation::{Bench, Row, above};
 
-/// Rays in all directions, without an end, from the middle of a large view.
+/// Rays of infinite length in all directions, from the middle of a large view.
 pub(crate) fn endless_rays(bench: &Bench) -> Vec<Row> {
     let mut game = bench.game(World::Hills.terrain());
     game.spawn_viewer(TerrainViewer::new(320.0), above(0.0, 0.0));

@@ -11,7 +11,7 @@ use crate::situation::{Bench, Row, updates_until};
 /// High above the middle of the terrain.
 const MIDDLE: Vec3 = Vec3::new(520.0, 120.0, 520.0);
 
-/// A terrain of 4,096 chunks: a colour is dragged, the isovalue changes, and a dig follows another palette.
+/// A terrain of 4,096 chunks: a colour changes in every update, the isovalue changes, and a dig follows a new palette.
 pub(crate) fn changes(bench: &Bench) -> Vec<Row> {
     let mut game = bench.game(Terrain::new(NoiseHeights::default()).with_extent(UVec3::new(32, 4, 32)));
     bench.settle(&mut game);
@@ -43,7 +43,7 @@ fn change_palette(game: &mut Game) {
     game.change_terrain(|terrain| terrain.palette.colors.rotate_left(1));
 }
 
-/// How far below the middle the surface is drawn.
+/// The depth of the drawn surface below the middle.
 fn shown_depth(game: &mut Game) -> Option<f32> {
     let mut state = SystemState::<TerrainQuery>::new(game.app.world_mut());
     let terrains = state.get(game.app.world()).expect("a query is always valid");

@@ -1,4 +1,4 @@
-//! What the situations share: how long they run, and the rows that they give.
+//! [`Bench`] and [`Row`]: how long situations run, and the rows that they return.
 
 use std::fmt;
 
@@ -7,13 +7,13 @@ use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 use marchless_plugin_benches::{Game, PACE, Times, milliseconds};
 
-/// Whether situations are measured or only tried out.
+/// The mode of a run: situations are measured, or only tried out.
 pub(crate) struct Bench {
     pub(crate) test: bool,
 }
 
 impl Bench {
-    /// How many updates, rays or the like to measure: `count`, and a few when only trying out.
+    /// The number of updates, rays or the like to measure: `count`, or a few if situations are only tried out.
     pub(crate) fn count(&self, count: u32) -> u32 {
         if self.test { count.min(20) } else { count }
     }
@@ -41,12 +41,12 @@ impl Row {
         Self { situation: situation.into(), times, figure: String::new() }
     }
 
-    /// The same row with a figure of another unit.
+    /// The row with a figure in another unit.
     pub(crate) fn with_figure(self, figure: impl Into<String>) -> Self {
         Self { figure: figure.into(), ..self }
     }
 
-    /// The same row, which says whether the situation came to its end, and after how many updates.
+    /// The row with the number of updates until the situation's end, and whether it was reached.
     pub(crate) fn with_updates_until(self, what: &str, reached: bool) -> Self {
         let more = if reached { "" } else { "> " };
         let figure = format!("{what} after {more}{} updates", self.times.count());
@@ -81,7 +81,8 @@ pub(crate) fn above(x: f32, z: f32) -> Transform {
     Transform::from_translation(Vec3::new(x, 80.0, z))
 }
 
-/// Runs updates, each after a change, until `done`, but at most `most`; also tells whether that came true.
+/// Runs updates, each after a change, until `done` or for at most `most` updates. Also returns whether `done` was
+/// reached.
 pub(crate) fn updates_until(
     game: &mut Game,
     most: u32,

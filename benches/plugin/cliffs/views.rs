@@ -7,7 +7,7 @@ use marchless_plugin_benches::{Game, PACE, World};
 
 use crate::situation::{Bench, Row, above, updates_until};
 
-/// How many updates until an endless view is full, alone and with a dig in every update.
+/// The number of updates until an endless view is full, without edits and with a dig in every update.
 pub(crate) fn filling(bench: &Bench) -> Vec<Row> {
     World::ALL.into_iter().flat_map(|world| fill(bench, world)).collect()
 }
@@ -46,7 +46,7 @@ fn nearby(number: u64) -> Vec3 {
     Vec3::new(64.0 * random(0), 100.0, 64.0 * random(1))
 }
 
-/// A viewer that is somewhere else in every update, between two places that share no chunk; then it stays.
+/// A viewer that jumps in every update between two places whose views share no chunk, and then stays.
 pub(crate) fn jumping(bench: &Bench) -> Vec<Row> {
     let mut game = bench.game(World::Hills.terrain());
     let viewer = game.spawn_viewer(TerrainViewer::new(256.0), above(0.0, 0.0));

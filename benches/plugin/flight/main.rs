@@ -1,9 +1,9 @@
-//! Flights through endless worlds, at the pace of a game: what streaming costs the main thread, update by update.
+//! Flights through endless worlds at the pace of a game: the cost of streaming on the main thread, update by update.
 //!
-//! Viewers see 8 chunks of 32 voxels far in all directions, in a headless app with mesh assets. Each update runs as a
-//! game's would, sixty times a second, and sleeps for the rest of its time, while jobs sample and mesh on their
-//! threads. What is measured is the CPU time of the main thread in the plugin's systems, commands included, with a
-//! single-threaded executor for their schedule: other processes disturb it less than a clock on the wall.
+//! Viewers see 8 chunks of 32 voxels far in all directions, in a headless app with mesh assets. Updates run as in a
+//! game, sixty times a second, and sleep for the rest of their time, while jobs sample and mesh on their threads. The
+//! bench measures the CPU time of the main thread in the plugin's systems, including their commands, with a
+//! single-threaded executor for their schedule. Other processes disturb this time less than wall-clock time.
 //!
 //! ```text
 //! cargo bench -p marchless_plugin_benches --bench flight                       # each flight for 20 seconds

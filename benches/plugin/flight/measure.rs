@@ -1,4 +1,4 @@
-//! Flying a route, and what it took.
+//! [`Flight`]: flies a route and measures it.
 
 use std::time::{Duration, Instant};
 
@@ -12,27 +12,29 @@ use marchless_plugin_benches::{Game, PACE, Times, World, resident_bytes};
 
 use crate::route::{ROUTES, Route};
 
-/// How far a viewer sees: 8 chunks.
+/// A viewer's radius of view: 8 chunks.
 const RADIUS: f32 = 256.0;
 
-/// What a flight took.
+/// The measurements of a flight.
 pub(crate) struct Flight {
     /// CPU time of each update's systems.
     pub(crate) updates: Times,
     /// Updates until the first view was complete, and after each teleport; the last may not be complete.
     pub(crate) complete: Vec<u32>,
-    /// The most leaves in range that waited, apart from teleports.
+    /// The most leaves in range that were pending at once, except after teleports.
     pub(crate) waiting: usize,
-    /// All it did after the first view, and in what time.
+    /// The work done after the first view was complete.
     pub(crate) stats: TerrainStats,
+    /// The time that this work took.
     pub(crate) time: Duration,
-    /// Samples and geometry, by the plugin's own account.
+    /// The memory of samples and geometry, as the plugin counts it.
     pub(crate) resident: f64,
     pub(crate) per_surface_chunk: f64,
 }
 
 impl Flight {
-    /// Flies for so many updates. `paced`: sixty a second, and only after the first view is complete.
+    /// Flies for so many updates. If `paced`, the flight runs at sixty updates a second and starts when the first view
+    /// is complete.
     pub(crate) fn fly(world: World, route: &Route, updates: u32, paced: bool) -> Self {
         let mut game = Game::new(world.terrain(), paced);
         let viewers: Vec<_> = (0..route.viewers)
@@ -121,7 +123,7 @@ pub(crate) fn long_flight(minutes: u32) -> String {
     text
 }
 
-/// How many bytes the samples of chunks take that are kept for their edits alone.
+/// The bytes of samples of chunks that are kept for their edits alone.
 fn edited_bytes(volume: &TerrainVolume) -> usize {
     let kept = volume.grid().chunks().filter(|(position, _)| volume.leaf_at(IVec3::from(*position)).is_none());
     kept.map(|(_, chunk)| match chunk {
@@ -131,7 +133,7 @@ fn edited_bytes(volume: &TerrainVolume) -> usize {
     .sum()
 }
 
-/// Digs into the ground in front of a route's first viewer, where its samples are there.
+/// Digs into the ground in front of a route's first viewer, if its samples are loaded.
 fn dig_ahead(game: &mut Game, route: &Route, update: u32) {
     if let Some(ground) = game.ground_below(route.transform(update, 0).translation + Vec3::X * 24.0) {
         game.dig(ground, 5.0);

@@ -1,4 +1,4 @@
-//! The report: a table of all flights, printed, and written down if asked.
+//! The report: a table of all flights, printed, and recorded on request.
 
 use std::process::ExitCode;
 
@@ -7,7 +7,7 @@ use marchless_plugin_benches::{machine, milliseconds, print_and_record, processo
 
 use crate::measure::Flight;
 
-/// Prints the table, and writes it to `benches/record/` where `MARCHLESS_RECORD=1` asks for it.
+/// Prints the table, and writes it to `benches/record/` if `MARCHLESS_RECORD=1`.
 pub(crate) fn report(flights: &[(String, Flight)]) -> ExitCode {
     print_and_record("flight", &text(flights))
 }

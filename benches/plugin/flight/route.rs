@@ -1,16 +1,16 @@
-//! Ways through worlds.
+//! [`Route`]: the paths of viewers through worlds.
 
 use bevy_math::Vec3;
 use bevy_transform::components::Transform;
 use marchless_plugin_benches::PACE;
 
-/// A way through a world.
+/// The path of viewers through a world.
 pub(crate) struct Route {
     pub(crate) name: &'static str,
     pub(crate) viewers: usize,
-    /// Where a viewer is after so many seconds, in voxels.
+    /// The place of a viewer after so many seconds, in voxels.
     pub(crate) place: fn(seconds: f32, viewer: usize) -> Vec3,
-    /// Seconds between two teleports, which lie so far apart that nothing of the former view is left.
+    /// Seconds between two teleports, which go so far that the views before and after share no chunk.
     pub(crate) teleport: Option<u32>,
     /// Updates between two balls of radius 5 dug in front of the viewer.
     pub(crate) dig: Option<u32>,
@@ -54,7 +54,7 @@ pub(crate) const ROUTES: [Route; 6] = [
 ];
 
 impl Route {
-    /// Where a viewer is in an update, and that it looks where it flies.
+    /// The transform of a viewer in an update; it faces its direction of flight.
     pub(crate) fn transform(&self, update: u32, viewer: usize) -> Transform {
         let place = |update: u32| (self.place)(update as f32 / PACE as f32, viewer);
         let (from, ahead) = (place(update), place(update + 1));
@@ -62,7 +62,7 @@ impl Route {
         Transform::from_translation(from).looking_to(forward, Vec3::Y)
     }
 
-    /// Whether the viewers are somewhere else in this update.
+    /// True if the viewers teleport in this update.
     pub(crate) fn teleports(&self, update: u32) -> bool {
         self.teleport.is_some_and(|seconds| update > 0 && update.is_multiple_of(seconds * PACE))
     }

@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-/// How long this thread has been running, without the time it waited for a processor.
+/// The CPU time of this thread.
 #[cfg(unix)]
 pub fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
-/// Elsewhere, the time on the wall.
+/// Wall-clock time, on systems without a thread's CPU time.
 #[cfg(not(unix))]
 pub fn thread_time() -> Duration {
     use std::sync::LazyLock;

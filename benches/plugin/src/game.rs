@@ -20,20 +20,20 @@ use crate::times::Times;
 /// Updates a second.
 pub const PACE: u32 = 60;
 
-/// A headless app with mesh assets and a terrain; each update tells how long the plugin kept the main thread busy.
+/// A headless app with mesh assets and a terrain; each update returns the time that the plugin took on the main thread.
 ///
-/// Time is the thread's CPU time in the plugin's systems, their commands included. Their schedule has a single-threaded
-/// executor, so that other processes disturb it less than they would a clock on the wall.
+/// This is the thread's CPU time in the plugin's systems, including their commands. Their schedule has a
+/// single-threaded executor. Other processes disturb this time less than wall-clock time.
 pub struct Game {
     /// The app.
     pub app: App,
     /// The terrain's entity.
     pub terrain: Entity,
-    /// Whether an update sleeps for the rest of its sixtieth of a second, while jobs run on their threads.
+    /// True if an update sleeps for the rest of its sixtieth of a second, while jobs run on their threads.
     paced: bool,
 }
 
-/// When the plugin's systems began, and how long they took.
+/// The start of the plugin's systems, and the time that they took.
 #[derive(Resource, Default)]
 struct Meter {
     start: Duration,
@@ -66,7 +66,7 @@ impl Game {
         self.app.world_mut().spawn((viewer, place)).id()
     }
 
-    /// Puts an entity somewhere else.
+    /// Moves an entity.
     pub fn place(&mut self, entity: Entity, place: Transform) {
         self.app.world_mut().entity_mut(entity).insert(place);
     }
@@ -82,7 +82,7 @@ impl Game {
         self.app.world_mut().write_message(Stamp::dig(self.terrain, BrushShape::sphere(center, radius)));
     }
 
-    /// Runs one update, and tells how long the plugin's systems took.
+    /// Runs one update, and returns the time of the plugin's systems.
     pub fn update(&mut self) -> Duration {
         let start = Instant::now();
         self.app.update();
@@ -101,7 +101,7 @@ impl Game {
         (0..count).map(update).collect()
     }
 
-    /// Runs updates until the terrain has settled, but at most `most`; also tells whether it has.
+    /// Runs updates until the terrain has settled, at most `most`. Also returns whether it has settled.
     pub fn settle(&mut self, most: u32) -> (Times, bool) {
         let mut times = Vec::new();
         let mut settled = false;
@@ -117,12 +117,12 @@ impl Game {
         self.app.world().get::<TerrainVolume>(self.terrain).expect("a terrain has a volume")
     }
 
-    /// Whether all that was asked for is drawn.
+    /// True if the terrain has settled: everything requested is drawn.
     pub fn is_settled(&self) -> bool {
         self.volume().is_settled()
     }
 
-    /// The surface at most 200 voxels below a place, in voxels; `None` where its samples are not there.
+    /// The surface at most 200 voxels below a place, in voxels; `None` if there is none or its samples are not loaded.
     pub fn ground_below(&self, place: Vec3) -> Option<DVec3> {
         let origin = place.as_dvec3().to_array();
         self.volume().grid().ray_cast(0.0, origin, [0.0, -1.0, 0.0], 200.0).map(|hit| hit.position.into())

@@ -1,4 +1,4 @@
-//! What the benches share: a headless game whose updates are timed, worlds to run it in, and reports.
+//! Shared code of the plugin's benches: a headless game whose updates are timed, worlds for it, and reports.
 
 mod clock;
 mod game;

@@ -1,4 +1,4 @@
-//! Reports: printed, and written down if asked.
+//! Reports, printed, and recorded on request.
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -25,7 +25,7 @@ pub fn print_and_record(name: &str, report: &str) -> ExitCode {
     }
 }
 
-/// What a bench ran on and how to run it again, as a sentence.
+/// A sentence about the machine that a bench ran on, and the command that runs it again.
 pub fn machine(bench: &str) -> String {
     let cores = thread::available_parallelism().map_or(1, usize::from);
     format!(

@@ -1,22 +1,22 @@
-//! [`Request`]: what the command line asks for.
+//! [`Request`]: the parsed command line.
 
-/// What the command line asks for: numbers after options, a word, and whether to measure at all.
+/// The parsed command line: numbers after options, a filter word, and whether to measure at all.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// Whether all is only to be tried out.
+    /// True if everything is only tried out, not measured.
     pub test: bool,
-    /// Only what has this word in its name.
+    /// The filter: only items with this word in their names run.
     pub word: Option<String>,
     numbers: Vec<(String, u32)>,
 }
 
 impl Request {
-    /// Reads the command line; `options` are those that a number follows.
+    /// Parses the command line; each of `options` is followed by a number.
     ///
     /// # Errors
     /// A sentence about the first argument that is not understood.
     pub fn parse(mut arguments: impl Iterator<Item = String>, options: &[&str]) -> Result<Self, String> {
-        // As criterion does: without `cargo bench`, only whether it runs.
+        // As in criterion: without `cargo bench`, everything is only tried out.
         let mut request = Self { test: true, word: None, numbers: Vec::new() };
         while let Some(argument) = arguments.next() {
             match argument.as_str() {
@@ -44,7 +44,7 @@ impl Request {
         self.numbers.iter().rev().find(|(name, _)| name == option).map(|(_, number)| *number)
     }
 
-    /// Whether something of this name is asked for.
+    /// True if the filter includes this name.
     pub fn includes(&self, name: &str) -> bool {
         self.word.as_ref().is_none_or(|word| name.contains(word))
     }

@@ -7,12 +7,12 @@ use std::time::Duration;
 pub struct Times(Vec<Duration>);
 
 impl Times {
-    /// How many there are.
+    /// The number of updates.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// The sum of all.
+    /// The sum of all times.
     pub fn total(&self) -> Duration {
         self.0.iter().sum()
     }
@@ -22,7 +22,7 @@ impl Times {
         self.total() / u32::try_from(self.count().max(1)).unwrap_or(u32::MAX)
     }
 
-    /// The time that this share of the updates, 0 to 1, does not exceed; zero if there are none.
+    /// The time that a share of the updates, 0 to 1, does not exceed; zero if there are none.
     pub fn quantile(&self, share: f64) -> Duration {
         let last = self.0.len().saturating_sub(1);
         self.0.get((last as f64 * share).round() as usize).copied().unwrap_or_default()

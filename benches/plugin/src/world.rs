@@ -1,9 +1,9 @@
-//! [`World`]: what the benches' terrains are made of.
+//! [`World`]: the endless worlds of the benches.
 
 use bevy_marchless::prelude::*;
 use bevy_marchless::source::prelude::*;
 
-/// What an endless world is made of.
+/// An endless world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum World {
     /// The default hills.
@@ -24,7 +24,7 @@ impl World {
         }
     }
 
-    /// An endless terrain of it, with the default settings.
+    /// The world's terrain, with the default settings.
     pub fn terrain(self) -> Terrain {
         match self {
             Self::Hills => Terrain::endless(NoiseHeights::default()),

@@ -1,9 +1,9 @@
-//! Fields for programs that are not Rust, and our time on the same files.
+//! Exports fields for programs in other languages, and times our mesher on the same files.
 //!
 //! `fields export FOLDER SIZE…` writes `FIELD-SIZE.f32` for sphere, terrain, caves and white noise: `[size³]` distances
-//! as little-endian `f32`, x fastest. `fields time FILE SIZE RUNS` meshes such a file with normals, all samples of it,
-//! with no padding, and prints the least and the median seconds of some runs after a first one, the vertices and the
-//! triangles.
+//! as little-endian `f32`, x fastest. `fields time FILE SIZE RUNS` meshes all samples of such a file with normals and
+//! without padding. After one run to warm up, it prints the least and the median seconds of the others, the vertices
+//! and the triangles.
 
 use std::{env, error::Error, fs, hint::black_box, path::Path, process::ExitCode, time::Instant};
 

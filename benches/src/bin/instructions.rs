@@ -1,15 +1,16 @@
-//! The gate that noise cannot move: how many instructions meshing takes, as valgrind's callgrind counts them, beside a
-//! committed baseline. More than 3 % above it fails.
+//! A performance gate without noise: the number of instructions that meshing takes, counted by valgrind's callgrind and
+//! compared with a committed baseline. A count more than 3 % above the baseline fails.
 //!
-//! `cargo run --release -p marchless_benches --bin instructions` measures and judges; with `-- --renew` it writes
-//! `benches/instructions.txt` instead, for a change that is worth what it costs, for one that made things faster, or
-//! for another compiler. Counts of another compiler than the baseline's are shown, but not judged; where `CI` is set in
-//! the environment, they fail, lest nobody judges any more.
+//! `cargo run --release -p marchless_benches --bin instructions` measures and judges. With `-- --renew` it writes
+//! `benches/instructions.txt` instead: for a change that is worth its cost, for one that made things faster, or for a
+//! new compiler. With a compiler other than the baseline's, counts are shown but not judged. If `CI` is set in the
+//! environment, they fail, so that the gate does not lapse unnoticed.
 //!
-//! Four fields of 35³ and 64³ `i16` samples, padding included, with normals, on the portable and the AVX2 backend, each
-//! forced, in both topologies, into warm buffers; and operations on the bits of 128³ caves, on AVX2 alone: they choose
-//! the fastest backend themselves, and valgrind knows no AVX-512. The fields are sampled before valgrind starts, since
-//! noise under valgrind takes long; what starts under it is this program again, told to do one thing with one file.
+//! It meshes four fields of 35³ and 64³ `i16` samples, including padding, with normals, on the portable and the AVX2
+//! backend, each forced, in both topologies, into warm buffers. It also runs operations on the bits of 128³ caves, on
+//! AVX2 only: they choose the fastest backend themselves, and valgrind does not support AVX-512. The fields are sampled
+//! before valgrind starts, since noise takes long under valgrind. Valgrind then runs this program again for each task
+//! and file.
 
 use core::{fmt, hint::black_box};
 use std::{
@@ -29,12 +30,13 @@ use marchless_benches::Field;
 const FIELDS: [Field; 4] = [Field::Sphere, Field::Terrain, Field::Caves, Field::WhiteNoise];
 const SIZES: [u32; 2] = [35, 64];
 const BACKENDS: [Backend; 2] = [Backend::Portable, Backend::Avx2];
-/// What the names of their rows end with.
+/// The ends of the rows' names for each topology.
 const TOPOLOGIES: [&str; 2] = ["", " trilinear"];
-/// What is done with bits, and to how many samples per axis of which field.
+/// The operations on bits.
 const OPERATIONS: [&str; 6] = ["case-masks", "shift", "and", "dilation", "flood", "components"];
+/// The field of the bits and its samples per axis.
 const BITS: (Field, u32) = (Field::Caves, 128);
-/// How many times the baseline a count may be.
+/// The highest ratio of a count to its baseline.
 const ALLOWED: f64 = 1.03;
 const RENEW: &str = "cargo run --release -p marchless_benches --bin instructions -- --renew";
 
@@ -58,7 +60,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Measures, prints, and fails where a count is too far above the baseline's.
+/// Measures, prints, and fails if a count is too far above the baseline's.
 fn judge() -> Result<(), Box<dyn Error>> {
     let path = baseline_path();
     let text =
@@ -110,7 +112,7 @@ fn baseline_path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("instructions.txt")
 }
 
-/// Instructions by what was done, and the compiler that made them.
+/// The instructions of each task, and the compiler.
 #[derive(Debug, PartialEq)]
 struct Counts {
     compiler: String,
@@ -119,7 +121,7 @@ struct Counts {
 }
 
 impl Counts {
-    /// Measures everything that this machine can.
+    /// Measures all tasks that this machine supports.
     fn measure() -> Result<Self, Box<dyn Error>> {
         let folder = env::temp_dir().join(format!("marchless-instructions-{}", std::process::id()));
         fs::create_dir_all(&folder)?;
@@ -128,7 +130,7 @@ impl Counts {
         Ok(Self { of: of?, compiler: compiler()? })
     }
 
-    /// Reads what `Display` wrote.
+    /// Parses the output of `Display`.
     fn parse(text: &str) -> Result<Self, Box<dyn Error>> {
         let mut compiler = None;
         let mut of = Vec::new();
@@ -192,7 +194,7 @@ fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
     Ok(counts)
 }
 
-/// Samples a field; its name in rows, and the file with its weights.
+/// Samples a field. Returns its name in rows, and the file with its weights.
 fn sampled(folder: &Path, field: Field, size: u32) -> io::Result<(String, PathBuf)> {
     let name = field.name().replace(' ', "-");
     let file = folder.join(format!("{name}-{size}.i16"));
@@ -224,7 +226,7 @@ fn weights(file: &Path) -> io::Result<Vec<i16>> {
     Ok(fs::read(file)?.as_chunks().0.iter().map(|&chunk| i16::from_le_bytes(chunk)).collect())
 }
 
-/// What runs under callgrind: meshes a file twice, to be counted the second time.
+/// The task under callgrind: meshes a file twice; the second time is counted.
 fn mesh(file: &Path, size: &str, backend: &str, topology: Topology) -> Result<(), Box<dyn Error>> {
     let weights = weights(file)?;
     let samples = Samples::new(Shape::cube(size.parse()?)?, &weights)?.padded();
@@ -245,7 +247,7 @@ fn mesh_and_count(mesher: &mut Mesher, samples: Samples<'_, i16>, settings: &Mes
     mesher.mesh(samples, settings, mesh).expect("it went well the first time");
 }
 
-/// What runs under callgrind: does something with the bits of a file twice, to be counted the second time.
+/// The task under callgrind: runs an operation on the bits of a file twice; the second time is counted.
 fn operate(file: &Path, size: &str, operation: &str) -> Result<(), Box<dyn Error>> {
     if Backend::fastest() != Backend::Avx2 {
         return Err("valgrind shows other instructions than AVX2".into());
@@ -266,7 +268,7 @@ fn bits_and_count(bits: &mut Bits, operation: &str) -> Result<usize, BitsError> 
     bits.operate(operation)
 }
 
-/// What operations read and write.
+/// The grids and buffers that operations read and write.
 struct Bits {
     grid: BitGrid,
     out: BitGrid,
@@ -275,7 +277,7 @@ struct Bits {
 }
 
 impl Bits {
-    /// Something of what came out.
+    /// Runs an operation, and returns a number that depends on its result.
     fn operate(&mut self, operation: &str) -> Result<usize, BitsError> {
         match operation {
             "case-masks" => self.grid.case_masks_into(&mut self.masks)?,

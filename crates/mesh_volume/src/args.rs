@@ -1,4 +1,4 @@
-//! [`Args`]: what the command line may say.
+//! [`Args`]: the command line.
 
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::output::FORMATS;
 use crate::sample::{Endian, SampleType};
 
-/// Meshes the isosurface of a volume; what lies below the isovalue is inside.
+/// Meshes the isosurface of a volume; samples below the isovalue are inside.
 #[derive(Parser, Debug)]
 #[command(name = "mesh_volume")]
 pub(crate) struct Args {
@@ -17,86 +17,87 @@ pub(crate) struct Args {
     #[arg(value_name = "IN.{raw,npy}")]
     pub(crate) input: PathBuf,
 
-    /// Samples per axis; a .npy file says so itself.
+    /// Samples per axis; a .npy file has them in its header.
     #[arg(long, value_name = "X,Y,Z", value_parser = shape, allow_hyphen_values = true)]
     pub(crate) shape: Option<[u32; 3]>,
 
-    /// The samples' type; a .npy file says so itself.
+    /// The type of the samples; a .npy file has it in its header.
     #[arg(long = "type", value_name = "TYPE")]
     pub(crate) sample_type: Option<SampleType>,
 
-    /// The order of a sample's bytes, little if nothing is said; a .npy file says so itself.
+    /// The byte order of the samples, by default little; a .npy file has it in its header.
     #[arg(long, value_name = "ORDER")]
     pub(crate) endian: Option<Endian>,
 
-    /// How many bytes of the file come before the samples, 0 if nothing is said; a .npy file says so itself.
+    /// The number of bytes before the samples, by default 0; a .npy file has its own header.
     #[arg(long, value_name = "BYTES", value_parser = bytes, allow_hyphen_values = true)]
     pub(crate) skip: Option<u64>,
 
-    /// Where the surface lies, in the samples' own numbers; for bool 0.5, since false is 0 and true is 1.
+    /// The value at the surface, in the units of the samples; for bool 0.5, since false is 0 and true is 1.
     ///
-    /// Samples of more than 16 bits are meshed by their difference to V in 32-bit floating point: it is rounded to 24
-    /// bits, though no sample changes sides. V itself is a 64-bit number, so that beyond 2^53 it may be rounded.
+    /// Samples of more than 16 bits are meshed by their difference to V in 32-bit floating point. The difference is
+    /// rounded to 24 bits, but no sample changes sides. V itself is a 64-bit number; beyond 2^53 it may be rounded.
     #[arg(long, value_name = "V", value_parser = finite, default_value_t = 0.0, allow_hyphen_values = true)]
     pub(crate) iso: f64,
 
-    /// Let normals point, and triangles look, to smaller values rather than to larger ones.
+    /// Turn normals and triangles towards smaller values, not towards larger ones.
     #[arg(long)]
     pub(crate) invert: bool,
 
-    /// How far apart neighbouring samples are along each axis.
+    /// The distance of neighbouring samples along each axis.
     #[arg(long, value_name = "X,Y,Z", value_parser = spacing, default_value = "1,1,1", allow_hyphen_values = true)]
     pub(crate) spacing: [f64; 3],
 
     /// The position of the first sample.
     ///
-    /// Positions are 32-bit numbers: the farther from 0, the coarser they are rounded.
+    /// Positions are 32-bit numbers: far from 0, they are rounded more coarsely.
     #[arg(long, value_name = "X,Y,Z", value_parser = origin, default_value = "0,0,0", allow_hyphen_values = true)]
     pub(crate) origin: [f64; 3],
 
     /// Close the surface where it leaves the volume.
     ///
-    /// The space around the volume counts as outside: as above the isovalue, or with --invert as below it. Walls lie
-    /// half a sample beyond the outermost samples; beyond a sample that is equal to the isovalue, 1/1024 of one.
+    /// The space around the volume counts as outside: above the isovalue, or with --invert below it. Walls lie half a
+    /// sample beyond the outermost samples; beyond a sample that equals the isovalue, only 1/1024 of a sample.
     #[arg(long)]
     pub(crate) close: bool,
 
-    /// Where the signs of a cell's corners leave open what is joined, do as the trilinear interpolant has it, rather
-    /// than separate what is inside.
+    /// Where the signs of a cell's corners are ambiguous, follow the trilinear interpolant; by default, inside corners
+    /// stay separate.
     #[arg(long)]
     pub(crate) exact: bool,
 
-    /// Write one mesh per chunk of N cells along each axis (fewer at the far ends) rather than a single one.
+    /// Write one mesh per chunk of N cells along each axis (fewer at the far ends), not a single one.
     ///
-    /// The files are OUT.0000.ply and so on, numbered by chunk, x fastest; together they are the whole mesh, in its
-    /// coordinates. A chunk without surface has no file, and loses an old one. A layer of chunks is held in memory.
+    /// The files are OUT.0000.ply and so on, numbered by chunk, x fastest. Together they are the whole mesh, in its
+    /// coordinates. A chunk without a surface has no file; an old file of it is removed. A layer of chunks is held in
+    /// memory.
     #[arg(long, value_name = "N", value_parser = cells, allow_hyphen_values = true)]
     pub(crate) chunk: Option<NonZeroU32>,
 
     /// Print a report of the mesh's soundness; with any defect, write nothing and end with exit code 3.
     ///
-    /// Where the surface leaves the volume it may be open, unless --close closes it. Each chunk is examined by itself.
-    /// The mesh is held in memory: a layer of chunks at a time with --chunk, otherwise all of it. Examining it takes
-    /// another 200 bytes a triangle.
+    /// The surface may be open where it leaves the volume, unless --close closes it. Each chunk is checked by itself.
+    /// The mesh is held in memory: a layer of chunks at a time with --chunk, otherwise all of it. The check takes
+    /// another 200 bytes per triangle.
     #[arg(long)]
     pub(crate) check: bool,
 
-    /// The mesh; an old file is replaced, but only by a whole new one.
+    /// The mesh file. An old file is replaced only when the new one is complete.
     #[arg(short, long, value_name = "OUT.{ply,obj,stl,glb}")]
     pub(crate) output: PathBuf,
 }
 
 impl Args {
-    /// How many layers of samples the mesher gets around the volume.
+    /// The number of layers of samples that are added around the volume.
     pub(crate) const fn margin(&self) -> u32 {
         self.close as u32
     }
 
-    /// Says what is wrong with the files' names and places, if anything is, before any work is done.
+    /// Checks the names and places of the files before any work is done.
     ///
     /// # Errors
-    /// [`Error`] where the output would replace the input (chunks are looked at later), has no folder, is no file or of
-    /// no known format.
+    /// [`Error`] if the output would replace the input (the files of chunks are checked later), if its folder does not
+    /// exist, or if it is not a file or has no known format.
     pub(crate) fn check_files(&self) -> Result<(), Error> {
         let path = || self.output.clone();
         if self.chunk.is_none() {
@@ -112,10 +113,10 @@ impl Args {
         Ok(())
     }
 
-    /// Says what is wrong with replacing what is at `path`, if anything is.
+    /// Checks that `path` may be replaced.
     ///
     /// # Errors
-    /// [`Error::SameFile`] where it is the input, [`Error::OutputNotAFile`] where it is no file.
+    /// [`Error::SameFile`] if it is the input, [`Error::OutputNotAFile`] if it is not a file.
     pub(crate) fn check_replaced(&self, path: &Path) -> Result<(), Error> {
         if let (Ok(input), Ok(output)) = (self.input.canonicalize(), path.canonicalize())
             && input == output
@@ -129,12 +130,12 @@ impl Args {
     }
 }
 
-/// The folder that a file lies in, or will.
+/// The folder of a file, which need not exist yet.
 pub(crate) fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What follows the last dot of a file's name, in small letters; empty where nothing does.
+/// The extension of a file's name in lower case; empty if there is none.
 pub(crate) fn extension(path: &Path) -> String {
     path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
 }

@@ -1,11 +1,11 @@
-//! [`Closed`]: a layer of samples around the volume that lie outside, so that the surface closes at its border.
+//! [`Closed`]: a layer of outside samples around the volume, so that the surface closes at its border.
 //!
-//! Each of them is as far from the isovalue as the nearest sample of the volume. So the walls lie half a sample beyond
-//! the outermost samples, and normals are those of a surface that ends there. (Refused: the same large number all
-//! around. It would turn normals within the volume, and walls would meet in bevels of 1/1024 of a sample, which 32-bit
-//! positions cannot tell apart beyond 16,384 samples.)
+//! Each sample of the layer is as far from the isovalue as the nearest sample of the volume. So the walls lie half a
+//! sample beyond the outermost samples, and normals are those of a surface that ends there. (Refused: one large number
+//! all around. It would turn normals within the volume. Walls would meet in bevels of 1/1024 of a sample, which 32-bit
+//! positions cannot resolve beyond 16,384 samples.)
 //!
-//! All weights become `f32`: an integer type does not hold the opposite of each of its numbers.
+//! All weights become `f32`, since an integer type cannot negate its lowest number.
 
 use marchless::Weight;
 
@@ -21,8 +21,8 @@ pub(crate) struct Closed {
 }
 
 impl Closed {
-    /// `slab`: samples along the two axes, from 2 to [`u32::MAX`] − 2. `isovalue`: that of the weights to come.
-    /// `invert`: whether what lies below it is outside, rather than the rest.
+    /// `slab`: samples along the two axes, from 2 to [`u32::MAX`] − 2. `isovalue`: the isovalue of the weights.
+    /// `invert`: true if weights below it are outside.
     ///
     /// # Errors
     /// [`Error::Memory`].
@@ -64,7 +64,7 @@ impl Closed {
         &self.weights
     }
 
-    /// The slab of the layer that lies beyond a slab, which is the volume's first or last.
+    /// The slab of the layer beyond the volume's first or last slab.
     pub(crate) fn beyond<W: Weight>(&mut self, slab: &[W]) -> &[f32] {
         self.within(slab);
         let invert = self.invert;
@@ -73,10 +73,10 @@ impl Closed {
     }
 }
 
-/// As far from 0 as the weight, but outside.
+/// A weight with the same distance from 0, but outside.
 fn outside(weight: f32, invert: bool) -> f32 {
     const LEAST: f32 = f32::from_bits(1);
-    // The mesher sees NaN as the largest number.
+    // The mesher treats NaN as the largest number.
     let distance = if weight.is_nan() { f32::MAX } else { weight.abs().max(LEAST) };
     if invert { -distance } else { distance }
 }

@@ -1,4 +1,4 @@
-//! [`Error`]: why there is no mesh.
+//! [`Error`]: the reason why no mesh was written.
 
 use std::fmt;
 use std::io;
@@ -10,7 +10,7 @@ use crate::npy::NpyError;
 use crate::output::OutputError;
 use crate::sample::{Endian, SampleType};
 
-/// Why there is no mesh, or not all is well, in one sentence. Whatever it is, no half-written file is left behind.
+/// The reason why no mesh was written, or what else went wrong, in one sentence. No half-written file is left behind.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
     #[error("{} is both the input and the output; the mesh needs a file of its own", path.display())]
@@ -105,12 +105,12 @@ pub(crate) enum Error {
     Interrupted,
 }
 
-/// How many bytes come before the samples, and who says so.
+/// The number of bytes before the samples, and where the number comes from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Before {
-    /// The file itself.
+    /// From the file's own header.
     Header(u64),
-    /// The command line.
+    /// From the command line.
     Skip(u64),
 }
 
@@ -132,7 +132,8 @@ impl fmt::Display for Before {
 }
 
 impl Error {
-    /// 2 for bad input, 1 where the system cannot take the mesh, 3 for a mesh with defects, 130 for an interruption.
+    /// The program's exit code: 2 for bad input, 1 if the system cannot hold or write the mesh, 3 for a mesh with
+    /// defects, 130 for an interruption.
     pub(crate) const fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted => 130,

@@ -9,9 +9,9 @@ use crate::error::{Before, Error};
 use crate::npy::{Header, NpyError};
 use crate::sample::{Endian, SampleType};
 
-/// A file of samples, opened where they begin.
+/// A file of samples, opened at the first sample.
 ///
-/// What is said of its shape and what the file is long agree; so do its header and the command line.
+/// Its length agrees with its shape, and its header with the command line.
 #[derive(Debug)]
 pub(crate) struct Volume {
     path: PathBuf,
@@ -21,10 +21,10 @@ pub(crate) struct Volume {
     endian: Endian,
     /// Samples along x, y and z; at least 2 each.
     pub(crate) size: [u32; 3],
-    /// Whether neighbours along z, rather than x, are neighbours in the file. Then a slab is one of x.
+    /// True if neighbours along z are neighbours in the file, not those along x. A slab then has one x.
     ///
-    /// A NumPy array has the indices `[z][y][x]` whatever its order in memory, since NumPy hides that order from those
-    /// who use it. In C order, the last index is the fastest; in Fortran order the first is.
+    /// A NumPy array has the indices `[z][y][x]` in any memory order, since NumPy hides that order from its users. The
+    /// last index is the fastest in C order, the first one in Fortran order.
     pub(crate) z_fastest: bool,
 }
 
@@ -32,7 +32,8 @@ impl Volume {
     /// Opens the input.
     ///
     /// # Errors
-    /// [`Error`] where it is not what its name and the flags say, or its length is not what follows from its shape.
+    /// [`Error`] if the file does not agree with its name and the flags, or if its length does not agree with its
+    /// shape.
     pub(crate) fn open(args: &Args) -> Result<Self, Error> {
         let path = || args.input.clone();
         let extension = extension(&args.input);
@@ -40,7 +41,7 @@ impl Volume {
             return Err(Error::InputFormat { path: path() });
         }
         let read = |source| Error::Read { path: path(), source };
-        // Opening a pipe would wait for someone to write to it.
+        // Opening a pipe would wait for a writer.
         if !fs::metadata(&args.input).map_err(read)?.is_file() {
             return Err(Error::InputNotAFile { path: path() });
         }
@@ -79,7 +80,7 @@ impl Volume {
         [a, b]
     }
 
-    /// How many slabs there are.
+    /// The number of slabs.
     pub(crate) const fn slabs(&self) -> u32 {
         self.lattice()[2]
     }
@@ -87,7 +88,7 @@ impl Volume {
     /// Reads the next slab, which fills `bytes` with little-endian samples.
     ///
     /// # Errors
-    /// [`Error::Read`], also where the file has become shorter.
+    /// [`Error::Read`], also if the file has become shorter.
     pub(crate) fn read(&mut self, bytes: &mut [u8]) -> Result<(), Error> {
         self.file.read_exact(bytes).map_err(|source| match source.kind() {
             io::ErrorKind::UnexpectedEof => {
@@ -110,7 +111,7 @@ impl Volume {
         Error::Read { path: self.path.clone(), source }
     }
 
-    /// Takes over what the flags say; returns what comes before the samples.
+    /// Takes type, byte order and size from the flags. Returns the number of bytes before the samples.
     fn believe(&mut self, args: &Args) -> Result<Before, Error> {
         self.size = args.shape.ok_or(Error::FlagMissing { flag: "--shape" })?;
         self.sample_type = args.sample_type.ok_or(Error::FlagMissing { flag: "--type" })?;
@@ -118,7 +119,7 @@ impl Volume {
         Ok(Before::Skip(args.skip.unwrap_or(0)))
     }
 
-    /// Takes over what the header says; returns what comes before the samples.
+    /// Takes type, byte order and size from the header. Returns the number of bytes before the samples.
     fn read_header(&mut self, args: &Args) -> Result<Before, Error> {
         let path = || args.input.clone();
         let header = Header::read(&mut self.file).map_err(|error| match error {
@@ -151,7 +152,7 @@ impl Volume {
     }
 }
 
-/// Turns the order of the bytes in each sample of `N` bytes round.
+/// Reverses the bytes of each sample of `N` bytes.
 fn reverse_each<const N: usize>(bytes: &mut [u8]) {
     bytes.as_chunks_mut::<N>().0.iter_mut().for_each(|sample| sample.reverse());
 }

@@ -8,18 +8,18 @@
 //! mesh_volume scan.raw --shape 512,512,300 --type i16 --endian big --skip 1024 --origin -20,0,35.5 -o scan.ply
 //! ```
 //!
-//! What lies below the isovalue is inside. In a volume of `bool`, false is 0 and true is 1: `--iso 0.5` lies between
-//! them, and with `--invert` the mesh is that of what is true. Samples of up to 16 bits are exact. Of larger ones, the
-//! difference to the isovalue is rounded to an `f32` (24 bits), though never across zero; so the surface always lies
+//! Samples below the isovalue are inside. In a volume of `bool`, false is 0 and true is 1: `--iso 0.5` lies between
+//! them, and with `--invert` the mesh encloses the true samples. Samples of up to 16 bits are exact. For larger ones,
+//! the difference to the isovalue is rounded to an `f32` (24 bits), but never across zero. So the surface always lies
 //! between the right samples.
 //!
-//! Where the surface leaves the volume, it is open; `--close` closes it, half a sample beyond the outermost samples.
+//! The surface is open where it leaves the volume; `--close` closes it, half a sample beyond the outermost samples.
 //! `--origin` is the position of the first sample. Positions are `f32`: far from 0, they are rounded.
 //!
-//! The volume may be larger than memory: it is read, meshed and written a slab
-//! (the samples of one z) at a time. With `--chunk`, the meshes of one layer of chunks are held until it is complete;
-//! with `--check` alone, the whole mesh is, though never the volume. (So the mesh is judged by itself, as any reader
-//! would find it, not against its samples.)
+//! The volume may be larger than memory: it is read, meshed and written a slab (the samples of one z) at a time. With
+//! `--chunk`, the meshes of one layer of chunks are held until the layer is complete. With `--check` alone, the whole
+//! mesh is held, but never the volume. So the check judges the mesh by itself, as any reader would find it, not against
+//! its samples.
 
 mod args;
 mod close;
@@ -100,14 +100,14 @@ fn run(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether the user wants no more of it: `Ctrl-C`, or the system's wish that programs end.
+/// The flag that a request to stop raises: `Ctrl-C`, or the system's signal to terminate.
 struct Stop(Arc<AtomicBool>);
 
 impl Stop {
     fn on_signals() -> Self {
         let flag = Arc::new(AtomicBool::new(false));
         let raised = Arc::clone(&flag);
-        // Where there are no such signals, nothing is lost but the tidying up.
+        // Without such signals, only the tidying up after an interruption is missing.
         let _ = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed));
         Self(flag)
     }
@@ -117,7 +117,7 @@ impl Stop {
     }
 }
 
-/// What has been made of what, in one line.
+/// A line that sums up the input, the mesh and the times.
 fn summary(args: &Args, volume: &Volume, chunks: Option<&Chunks>, made: &Made, times: Times) -> String {
     let [x, y, z] = volume.size;
     let chunks = chunks.map_or_else(String::new, |chunks| {
@@ -136,12 +136,12 @@ fn summary(args: &Args, volume: &Volume, chunks: Option<&Chunks>, made: &Made, t
     )
 }
 
-/// Prints to standard output. The mesh is whole already, whether or not anyone listens.
+/// Prints to standard output. Errors are ignored, since the mesh is complete already.
 fn say(text: impl fmt::Display) {
     let _ = write!(io::stdout(), "{text}");
 }
 
-/// Prints to standard error what the user may want to know.
+/// Prints a note for the user to standard error.
 fn note(text: impl fmt::Display) {
     let _ = writeln!(io::stderr(), "note: {text}");
 }

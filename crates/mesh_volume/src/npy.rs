@@ -1,9 +1,8 @@
-//! [`Header`]: what a `.npy` file says of the array that follows.
+//! [`Header`]: the header of a `.npy` file.
 //!
 //! The format is that of NumPy's `numpy.lib.format`, versions 1 to 3: a magic, a version, the length of the rest, and a
-//! Python dictionary of three entries. There are crates for it, but with a parser of all of Python's literals and big
-//! numbers behind them; what NumPy writes for plain numbers is little enough to be read here, with a sentence for
-//! everything else.
+//! Python dictionary of three entries. Crates for it bring parsers of all Python literals and big numbers. What NumPy
+//! writes for plain numbers is simple enough to be parsed here, with a clear error for everything else.
 
 use std::io::{self, Read};
 
@@ -13,20 +12,20 @@ use crate::sample::{Endian, SampleType};
 
 const MAGIC: [u8; 6] = *b"\x93NUMPY";
 
-/// No header of three entries needs more.
+/// The longest header text that is accepted; three entries need far less.
 const MAX_TEXT: u64 = 1 << 16;
 
-/// What a `.npy` file says of its array.
+/// The description of the array in a `.npy` file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     pub(crate) sample_type: SampleType,
-    /// The order of a sample's bytes, where it has several.
+    /// The byte order of the samples; `None` for single bytes.
     pub(crate) endian: Option<Endian>,
     /// The lengths of the array's three axes, in the order of their indices.
     pub(crate) shape: [u64; 3],
-    /// Whether neighbours along the first axis, rather than the last, are neighbours in the file.
+    /// True if neighbours along the first axis are neighbours in the file, not those along the last.
     pub(crate) fortran_order: bool,
-    /// Where in the file the samples begin.
+    /// The number of bytes before the samples.
     pub(crate) length: u64,
 }
 
@@ -34,7 +33,8 @@ impl Header {
     /// Reads the header at the beginning of a file, and no further.
     ///
     /// # Errors
-    /// [`NpyError`] where it is none, or the array is not one of three axes and of a type that can be meshed.
+    /// [`NpyError`] if there is no valid header, or if the array does not have three axes and a type that can be
+    /// meshed.
     pub(crate) fn read(file: &mut impl Read) -> Result<Self, NpyError> {
         let start = read_exactly(file, 8).map_err(|error| match error {
             NpyError::CutShort { .. } => NpyError::Magic,
@@ -59,7 +59,7 @@ impl Header {
     }
 }
 
-/// Why a `.npy` file has no usable header.
+/// The reason why the header of a `.npy` file was refused.
 #[derive(Debug, Error)]
 pub(crate) enum NpyError {
     #[error("{0}")]
@@ -84,14 +84,14 @@ pub(crate) enum NpyError {
     Axes { found: usize },
 }
 
-/// Reads `count` bytes, without believing beforehand that there are as many.
+/// Reads `count` bytes. Does not trust the count: allocates only what the file really has.
 fn read_exactly(file: &mut impl Read, count: u64) -> Result<Vec<u8>, NpyError> {
     let mut bytes = Vec::new();
     let found = file.take(count).read_to_end(&mut bytes)? as u64;
     if found == count { Ok(bytes) } else { Err(NpyError::CutShort { expected: count, found }) }
 }
 
-/// Reads the dictionary: `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4, 5), }`, and spaces.
+/// A parser of the dictionary: `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4, 5), }`, and spaces.
 struct Parser<'a> {
     text: &'a [u8],
     at: usize,
@@ -158,7 +158,7 @@ impl Parser<'_> {
             "|" | "<" | ">" | "=" if sample_type.bytes() == 1 => None,
             "<" => Some(Endian::Little),
             ">" => Some(Endian::Big),
-            // The reader's own, as NumPy has it.
+            // Native order means the reader's, as in NumPy.
             "=" => Some(Endian::NATIVE),
             _ => return Err(NpyError::Type { found }),
         };
@@ -196,7 +196,7 @@ impl Parser<'_> {
         let number = str::from_utf8(&self.text[self.at..][..digits]).ok().and_then(|digits| digits.parse().ok());
         let number = number.ok_or_else(|| self.error("a length of up to 64 bits"))?;
         self.at += digits;
-        // What Python 2 put behind large numbers.
+        // Python 2 wrote an L after large numbers.
         self.eat(b'L');
         Ok(number)
     }
@@ -225,7 +225,7 @@ impl Parser<'_> {
         found
     }
 
-    /// The next byte that is no space.
+    /// The next byte that is not a space.
     fn peek(&mut self) -> Option<u8> {
         let spaces = self.text[self.at..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
         self.at += spaces;

@@ -1,8 +1,8 @@
-//! [`Output`]: a mesh file that grows piece by piece and takes its place only when it is whole.
+//! [`Output`]: a mesh file that grows piece by piece and takes its place only when it is complete.
 //!
-//! In every format a header with counts comes first, then what is written per vertex, then what is written per
-//! triangle. The counts and where the triangles begin are known last: room is left for the header, and the triangles
-//! wait in a second file (see [`Draft`]).
+//! Every format has a header with counts, then the data of the vertices, then the data of the triangles. The counts and
+//! the start of the triangles are known last. So space is left for the header, and the triangles wait in a second file
+//! (see [`Draft`]).
 
 mod draft;
 mod glb;
@@ -22,10 +22,10 @@ use crate::args::extension;
 use crate::error::Error;
 use draft::Draft;
 
-/// The formats, by the ends of their files' names.
+/// The formats, by file extension.
 pub(crate) const FORMATS: [&str; 4] = ["ply", "obj", "stl", "glb"];
 
-/// A mesh file in the making.
+/// A mesh file that is being written.
 pub(crate) struct Output {
     path: PathBuf,
     draft: Draft,
@@ -33,10 +33,10 @@ pub(crate) struct Output {
 }
 
 impl Output {
-    /// Begins a file that is to be at `path`, in the format that its name says.
+    /// Begins a file for `path`, in the format of its extension.
     ///
     /// # Errors
-    /// [`Error`] where there is no such format, or no file can be made in the folder.
+    /// [`Error`] if there is no such format, or if no file can be created in the folder.
     pub(crate) fn create(path: &Path) -> Result<Self, Error> {
         let encoder: Box<dyn Encoder> = match &*extension(path) {
             "ply" => Box::new(ply::Ply::default()),
@@ -45,14 +45,14 @@ impl Output {
             "glb" => Box::new(glb::Glb::default()),
             _ => return Err(Error::OutputFormat { path: path.to_owned() }),
         };
-        // A link stays one: what it leads to is replaced.
+        // A link stays a link; its target is replaced.
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let draft = Draft::create(&path, encoder.header_length())
             .map_err(|source| Error::Write { path: path.clone(), source: source.into() })?;
         Ok(Self { path, draft, encoder })
     }
 
-    /// Adds a piece of the mesh, whose indices count all vertices since the first piece.
+    /// Appends a piece of the mesh. Its indices count all vertices since the first piece.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -79,7 +79,7 @@ impl Output {
     }
 }
 
-/// A file that is whole and waits, under another name, to be put in its place.
+/// A complete file that waits, under another name, to be put in its place.
 pub(crate) struct Whole {
     path: PathBuf,
     name: TempPath,
@@ -88,7 +88,7 @@ pub(crate) struct Whole {
 /// Puts files in their places, where they replace older ones.
 ///
 /// # Errors
-/// [`Error::Write`] where one cannot be put there; those that did not replace any are then removed again.
+/// [`Error::Write`] if one cannot be put in its place; those that replaced no file are then removed again.
 pub(crate) fn put(files: Vec<Whole>) -> Result<(), Error> {
     let mut added = Vec::new();
     for Whole { path, name } in files {
@@ -109,17 +109,17 @@ pub(crate) fn put(files: Vec<Whole>) -> Result<(), Error> {
 
 /// A format of mesh files.
 trait Encoder {
-    /// How long the header is.
+    /// The length of the header in bytes.
     fn header_length(&self) -> usize;
 
-    /// Writes a piece of the mesh: to `body` what follows the header, to `tail` what follows the whole body.
+    /// Writes a piece of the mesh. `body` follows the header; `tail` follows the whole body.
     fn encode(&mut self, piece: &MeshBuffer, body: &mut dyn Write, tail: &mut dyn Write) -> Result<(), OutputError>;
 
     /// The header for all pieces.
     fn header(&self) -> Result<Vec<u8>, OutputError>;
 }
 
-/// Why a mesh is not written.
+/// The reason why a mesh file could not be written.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OutputError {
     #[error("{0}")]

@@ -1,17 +1,17 @@
-//! [`Recent`]: the vertices that the triangles of a slab may have.
+//! [`Recent`]: data of the latest vertices, which the triangles of a slab may use.
 
 use std::collections::{TryReserveError, VecDeque};
 
-/// A piece is what a slab adds: triangles between it and the slab before it, which have no other vertices than the two
-/// slabs.
+/// The number of latest pieces that are kept. A slab adds a piece: triangles between it and the slab before it, with
+/// vertices of these two slabs only.
 const PIECES: usize = 2;
 
-/// Something of each of the latest vertices, by the indices that count all vertices since the first.
+/// An item for each of the latest vertices, by the index that counts all vertices since the first.
 pub(crate) struct Recent<T> {
     vertices: VecDeque<T>,
-    /// How many came before those.
+    /// The number of vertices that are no longer kept.
     gone: usize,
-    /// How many there were before each of the latest pieces.
+    /// The number of vertices before each of the latest pieces.
     pieces: VecDeque<usize>,
 }
 
@@ -20,7 +20,7 @@ impl<T> Recent<T> {
         Self { vertices: VecDeque::new(), gone: 0, pieces: VecDeque::new() }
     }
 
-    /// Takes in a piece's vertices, and lets go of those that later pieces have nothing to do with.
+    /// Adds a piece's vertices, and drops those that later pieces cannot use.
     pub(crate) fn extend(&mut self, piece: impl ExactSizeIterator<Item = T>) -> Result<(), TryReserveError> {
         self.pieces.push_back(self.gone + self.vertices.len());
         if self.pieces.len() > PIECES

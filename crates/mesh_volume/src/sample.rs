@@ -1,8 +1,7 @@
-//! [`Sample`]: how the samples of a file become weights, with the isovalue moved along and no sample changing sides.
+//! [`Sample`]: the conversion of a file's samples and the isovalue to weights. No sample changes sides.
 //!
-//! The mesher computes with integers of up to 16 bits and with `f32`. So samples of up to 16 bits stay exactly what
-//! they are. Of all others, the difference to the isovalue becomes an `f32`; what is rounded is that difference, to 24
-//! bits.
+//! The mesher computes with integers of up to 16 bits and with `f32`. So samples of up to 16 bits stay exact. For all
+//! others, the difference to the isovalue becomes an `f32`; only this difference is rounded, to 24 bits.
 
 #[cfg(test)]
 mod tests;
@@ -58,7 +57,7 @@ impl fmt::Display for SampleType {
     }
 }
 
-/// The order of a sample's bytes.
+/// The byte order of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Endian {
     Little,
@@ -79,9 +78,9 @@ impl fmt::Display for Endian {
     }
 }
 
-/// A type of sample, and the weights that the mesher gets for it.
+/// A type of sample, and its conversion to weights.
 ///
-/// A weight lies below [`Sample::isovalue`] exactly where its sample lies below the isovalue in the file's own
+/// A weight lies below [`Sample::isovalue`] if and only if its sample lies below the isovalue in the file's own
 /// numbers; NaN lies below nothing.
 pub(crate) trait Sample {
     type Weight: Weight;
@@ -128,14 +127,12 @@ impl Sample for bool {
     }
 }
 
-/// The isovalue of integer weights, in voxels, for samples from `least` to `most`, the lowest of which becomes the
-/// lowest weight.
+/// The isovalue of integer weights, in voxels. Samples go from `least`, which becomes the lowest weight, to `most`.
 ///
-/// A whole number lies below an isovalue exactly where it lies below the next whole number up. So the rounding to
-/// `f32` may move the isovalue, but not onto or over a whole number.
+/// A whole number lies below an isovalue if and only if it lies below the next whole number above the isovalue. So
+/// rounding to `f32` may move the isovalue, but not onto or across a whole number.
 fn integer_isovalue<W: Weight>(iso: f64, least: f64, most: f64) -> f32 {
-    // Beyond the range nothing changes any more: no sample lies below the least one, all lie below one more than the
-    // most.
+    // Clamping changes nothing: no sample lies below `least`, and all lie below `most + 1`.
     let iso = iso.clamp(least, most + 1.0);
     // 0 for signed samples, half of the range for unsigned ones.
     let shift = least + (most - least + 1.0) / 2.0;
@@ -145,7 +142,7 @@ fn integer_isovalue<W: Weight>(iso: f64, least: f64, most: f64) -> f32 {
     ((iso - shift) as f32).clamp(floor, ceiling) / W::SCALE
 }
 
-/// Samples whose difference to the isovalue is what is meshed. `$above`: that difference.
+/// Samples that are meshed by their difference to the isovalue, which `$above` computes.
 macro_rules! wide_sample {
     ($type:ty, $above:ident) => {
         impl Sample for $type {
@@ -163,7 +160,7 @@ macro_rules! wide_sample {
     };
 }
 
-// An `i32` has more digits than an `f32`, but what is left of it near the isovalue has few.
+// An `i32` has more digits than an `f32`, but its difference to an isovalue near it has few.
 wide_sample!(i32, above);
 wide_sample!(u32, above);
 wide_sample!(f32, above);
@@ -172,7 +169,7 @@ wide_sample!(f64, above);
 wide_sample!(i64, above_long);
 wide_sample!(u64, above_long);
 
-/// How far the sample lies above the isovalue, rounded such that it is negative exactly where the sample lies below.
+/// The sample minus the isovalue. Rounding keeps the sign: the result is negative if and only if the sample lies below.
 #[inline(always)]
 fn above(sample: f64, iso: f64) -> f32 {
     // Never zero for different numbers.
@@ -187,7 +184,8 @@ fn above_long(sample: i128, iso: f64) -> f32 {
     rounded(steps as f64 - (iso - whole))
 }
 
-/// The difference as an `f32` of the same sign; one that is too small becomes zero, or the smallest number below.
+/// The difference as an `f32` of the same sign. A tiny one becomes zero, or if it is negative the smallest number below
+/// zero.
 #[inline(always)]
 fn rounded(difference: f64) -> f32 {
     const LEAST: f32 = f32::from_bits(1);

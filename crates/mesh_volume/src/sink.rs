@@ -1,4 +1,4 @@
-//! [`Sink`]: where the mesh goes while it is made.
+//! [`Sink`]: the receiver of the mesh, piece by piece.
 
 mod chunked;
 mod series;
@@ -16,34 +16,34 @@ use crate::output::{self, Whole};
 pub(crate) use chunked::ChunkedSink;
 pub(crate) use whole::WholeSink;
 
-/// What examining a mesh needs at most; measured.
+/// The most memory that the check of a mesh takes per triangle, as measured.
 const BYTES_PER_TRIANGLE: usize = 200;
 
-/// Where the mesh goes, piece by piece.
+/// A receiver of the mesh, piece by piece.
 pub(crate) trait Sink {
-    /// Takes what slab `slab` has added to the mesh out of `piece`.
+    /// Takes the piece that slab `slab` has added to the mesh out of `piece`.
     ///
     /// # Errors
-    /// [`Error`] where it cannot be written or held in memory, or the user has enough of it.
+    /// [`Error`] if the piece cannot be written or held in memory, or if the user has interrupted the program.
     fn take(&mut self, slab: u32, piece: &mut MeshBuffer, stop: &Stop) -> Result<(), Error>;
 
     /// Completes all files.
     ///
     /// # Errors
-    /// As [`take`](Self::take).
+    /// Those of [`take`](Self::take).
     fn finish(self: Box<Self>, stop: &Stop) -> Result<Made, Error>;
 }
 
-/// What has been made: files that are whole, but not in their places yet.
+/// The result: complete files that are not in their places yet.
 pub(crate) struct Made {
     pub(crate) files: Vec<Whole>,
-    /// Files of an earlier mesh, in the place of which there is nothing now.
+    /// Files of an earlier mesh that the new one does not replace.
     pub(crate) stale: Vec<PathBuf>,
     pub(crate) vertices: u64,
     pub(crate) triangles: u64,
-    /// Files that are numbered, too, but are no chunks of this mesh: the first and how many.
+    /// Numbered files that are not chunks of this mesh: the first one and their number.
     pub(crate) foreign: Option<(PathBuf, usize)>,
-    /// What `--check` has found, where it was wanted.
+    /// The findings of `--check`; `None` without that flag.
     pub(crate) check: Option<Check>,
 }
 
@@ -51,7 +51,7 @@ impl Made {
     /// Puts all files in their places and removes those of an earlier mesh.
     ///
     /// # Errors
-    /// [`Error::Write`], and nothing has been added, [`Error::Remove`].
+    /// [`Error::Write`], after which no file has been added; [`Error::Remove`].
     pub(crate) fn put(self) -> Result<(), Error> {
         output::put(self.files)?;
         for path in self.stale {
@@ -61,29 +61,29 @@ impl Made {
     }
 }
 
-/// What `--check` has found.
+/// The findings of `--check`.
 pub(crate) struct Check {
-    /// How many meshes it has looked at, where those that are clean are not listed.
+    /// The number of meshes checked, if clean ones are not listed.
     pub(crate) meshes: Option<u64>,
-    /// Which meshes, and what it has found.
+    /// The meshes that are listed, each with its report.
     pub(crate) reports: Vec<(PathBuf, MeshReport)>,
-    /// How long it took.
+    /// The time that the check took.
     pub(crate) time: Duration,
 }
 
 impl Check {
-    /// Nothing yet. `several`: list no mesh that is clean.
+    /// No findings yet. Clean meshes are not listed if there are `several`.
     fn new(several: bool) -> Self {
         Self { meshes: several.then_some(0), reports: Vec::new(), time: Duration::ZERO }
     }
 
-    /// Examines a mesh that may be open where it leaves the box `[min, max]`.
+    /// Checks a mesh, which may be open where it leaves the box `[min, max]`.
     ///
     /// # Errors
     /// [`Error::MeshMemory`].
     fn examine(&mut self, path: &Path, mesh: &MeshBuffer, bounds: [[f32; 3]; 2]) -> Result<(), Error> {
         let since = Instant::now();
-        // Without room for what it needs, it would end the program and leave files behind.
+        // If memory ran out during the check, the program would abort and leave files behind.
         let room = mesh.triangle_count().saturating_mul(BYTES_PER_TRIANGLE);
         Vec::<u8>::new().try_reserve_exact(room).map_err(|_| Error::MeshMemory)?;
         let report = MeshReport::in_box(&mesh.positions, &mesh.indices, bounds);

@@ -1,9 +1,9 @@
-//! [`Split`]: the mesh of the whole volume, piece by piece, apart into one mesh per chunk.
+//! [`Split`]: splits the mesh of the whole volume, piece by piece, into one mesh per chunk.
 //!
-//! Nothing is meshed twice and nothing computed anew: a triangle goes to the chunk that its cell lies in, and takes its
-//! vertices along as they are. So neighbours agree on their border to the last bit, and all chunks together have the
-//! triangles of the whole mesh. (Refused: meshing each chunk from samples of its own. Its positions would be rounded
-//! elsewhere than the whole mesh's, and it would need a layer of padding that the volume's border does not have.)
+//! Nothing is meshed or computed twice: each triangle goes to the chunk of its cell, with its vertices unchanged. So
+//! neighbours agree on their border to the last bit, and all chunks together have the triangles of the whole mesh.
+//! (Refused: meshing each chunk from its own samples. Positions would be rounded differently than in the whole mesh,
+//! and chunks would need a layer of padding that the volume's border does not have.)
 
 use std::collections::{HashMap, TryReserveError};
 use std::num::NonZeroU32;
@@ -14,23 +14,24 @@ use crate::error::Error;
 use crate::input::Volume;
 use crate::recent::Recent;
 
-/// More than this many chunks are refused.
+/// The most chunks that are accepted.
 const MOST: u64 = 1_000_000;
 
-/// Which cells belong to which chunk. Cells and chunks are counted along the axes of the file, the fastest first.
+/// The division of cells into chunks. Cells and chunks are counted along the axes of the file, the fastest first.
 ///
 /// Cells of a margin around the volume belong to the chunks next to them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chunks {
     /// Cells of the volume per axis; at least 1.
     cells: [u32; 3],
-    /// Cells of a chunk per axis, at most.
+    /// The most cells of a chunk per axis.
     size: u32,
     /// Layers of samples around the volume.
     margin: u32,
-    /// How many chunks there are; at most [`MOST`].
+    /// The number of chunks; at most [`MOST`].
     pub(crate) count: u64,
-    /// How far the numbers of neighbours are apart: x fastest, whatever the order of the file.
+    /// The difference between the numbers of neighbours along each axis. Numbers run x fastest in any order of the
+    /// file.
     strides: [u64; 3],
 }
 
@@ -55,12 +56,12 @@ impl Chunks {
         Ok(Self { cells, size, margin, count: chunks as u64, strides })
     }
 
-    /// The number of the chunk at these positions, of which the first is 0.
+    /// The number of the chunk at this position, counted from 0.
     fn number(&self, chunk: [u32; 3]) -> u64 {
         (0..3).map(|axis| u64::from(chunk[axis]) * self.strides[axis]).sum()
     }
 
-    /// Which chunk along `axis` has the mesher's cells at `cell`.
+    /// The chunk along `axis` that has the mesher's cell `cell`.
     fn at(&self, axis: usize, cell: u32) -> u32 {
         cell.saturating_sub(self.margin).min(self.cells[axis] - 1) / self.size
     }
@@ -70,7 +71,7 @@ impl Chunks {
         self.cells[axis] + 2 * self.margin
     }
 
-    /// The first and the last of a chunk's samples, which it shares with its neighbours, by the mesher's count.
+    /// A chunk's first and last samples, which it shares with its neighbours, as the mesher counts them.
     fn samples(&self, chunk: [u32; 3]) -> [[u32; 3]; 2] {
         let first = [0, 1, 2].map(|axis| if chunk[axis] == 0 { 0 } else { chunk[axis] * self.size + self.margin });
         let last = [0, 1, 2].map(|axis| {
@@ -81,13 +82,14 @@ impl Chunks {
     }
 }
 
-/// Takes the whole mesh apart while it comes; holds what belongs to one layer of chunks.
+/// Splits the whole mesh while it is made. Holds the meshes of one layer of chunks.
 pub(crate) struct Split {
     chunks: Chunks,
     recent: Recent<Vertex>,
-    /// The present layer: the mesh of each chunk that has one, x (of the file) fastest.
+    /// The current layer: the mesh of each chunk that has one, with the file's fastest axis first.
     layer: Vec<Option<Box<MeshBuffer>>>,
-    /// The names that vertices on borders have in chunks other than the [last](Vertex::last), by chunk and index.
+    /// The indices that vertices on borders have in chunks other than the [last](Vertex::last), by chunk and index in
+    /// the whole mesh.
     names: HashMap<(u64, u32), u32>,
 }
 
@@ -95,16 +97,16 @@ pub(crate) struct Split {
 struct Vertex {
     position: [f32; 3],
     normal: [f32; 3],
-    /// The chunk of the triangle that had it last, and its index in that chunk's mesh.
+    /// The chunk of the latest triangle that uses it, and its index in that chunk's mesh.
     last: Option<(u64, u32)>,
 }
 
-/// A chunk with a surface, all of it.
+/// A complete chunk that has a surface.
 pub(crate) struct GridChunk {
     pub(crate) number: u64,
-    /// Its first and its last samples, by the mesher's count.
+    /// Its first and last samples, as the mesher counts them.
     pub(crate) samples: [[u32; 3]; 2],
-    /// As the whole mesh has it: in grid units from the mesher's first sample.
+    /// Its part of the whole mesh, in grid units from the mesher's first sample.
     pub(crate) mesh: MeshBuffer,
 }
 
@@ -113,8 +115,8 @@ impl Split {
         Self { chunks, recent: Recent::new(), layer: Vec::new(), names: HashMap::new() }
     }
 
-    /// Takes in what the mesher has made of slab `slab`: the vertices on it and below it, the triangles between it and
-    /// the one before. Returns the chunks that are complete with it.
+    /// Adds the mesher's output for slab `slab`: the vertices on it and below it, and the triangles between it and the
+    /// slab before. Returns the chunks that it completes.
     ///
     /// # Errors
     /// [`Error::MeshMemory`].
@@ -158,8 +160,8 @@ impl Split {
 }
 
 impl Vertex {
-    /// The vertex's index in the mesh of chunk `chunk`, to which it is added if that has not had it yet. `index`: the
-    /// one in the whole mesh.
+    /// The index of a vertex in the mesh of chunk `chunk`; adds the vertex if it is new there. `index` is its index in
+    /// the whole mesh.
     fn name(
         &mut self,
         index: u32,

@@ -1,4 +1,4 @@
-//! [`stream`]: slab by slab from the volume through the mesher to where the mesh goes.
+//! [`stream`]: slab by slab from the volume through the mesher to the sink.
 
 use std::time::{Duration, Instant};
 
@@ -13,20 +13,20 @@ use crate::input::Volume;
 use crate::sample::{Sample, SampleType};
 use crate::sink::{Made, Sink};
 
-/// How long each part of it took.
+/// The time that each part of the work took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Times {
     pub(crate) reading: Duration,
     pub(crate) meshing: Duration,
-    /// Checking the mesh, too.
+    /// Includes checking the mesh.
     pub(crate) writing: Duration,
 }
 
 /// Meshes the whole volume into `sink`.
 ///
 /// # Errors
-/// [`Error`] where the volume cannot be read to its end, the mesh cannot be named by 32-bit indices or written, or the
-/// user has enough of it.
+/// [`Error`] if the volume cannot be read to its end, if the mesh has too many vertices for 32-bit indices or cannot be
+/// written, or if the user has interrupted the program.
 pub(crate) fn stream(
     volume: &mut Volume,
     args: &Args,
@@ -93,14 +93,14 @@ fn for_each_slab<S: Sample>(
     Ok(())
 }
 
-/// A mesher on its way from the first slab to the last.
+/// A mesher with its progress from the first slab to the last.
 struct Meshing<'a, W> {
     args: &'a Args,
     stop: &'a Stop,
     sink: Box<dyn Sink>,
     mesher: SlabMesher<W>,
     mesh: MeshBuffer,
-    /// The slab that comes next.
+    /// The number of the next slab.
     next: u32,
     times: Times,
     since: Instant,
@@ -124,12 +124,12 @@ impl<'a, W: Weight> Meshing<'a, W> {
         Ok(Self { args, stop, sink, mesher, mesh, next: 0, times, since, progress })
     }
 
-    /// Meshes one slab more.
+    /// Meshes one more slab.
     fn push(&mut self, weights: &[W]) -> Result<(), Error> {
         spend(&mut self.since, &mut self.times.reading);
         self.mesher.push(weights, &mut self.mesh).map_err(|source| error(self.args, source))?;
         spend(&mut self.since, &mut self.times.meshing);
-        // The mesher waits for the next slab before it makes anything of one.
+        // The mesher's output for a slab comes when the next slab is pushed.
         if let Some(made) = self.next.checked_sub(1) {
             self.sink.take(made, &mut self.mesh, self.stop)?;
         }
@@ -155,7 +155,7 @@ fn error(args: &Args, source: MeshError) -> Error {
     Error::Mesh { path: args.input.clone(), source }
 }
 
-/// Counts the time that has passed since the last call as `part`.
+/// Adds the time since the last call to `part`.
 fn spend(since: &mut Instant, part: &mut Duration) {
     let now = Instant::now();
     *part += now - *since;
@@ -174,7 +174,7 @@ fn buffers<S: Sample>([a, b]: [u32; 2], sample_type: SampleType) -> Result<(Vec<
     Ok((bytes, weights))
 }
 
-/// Shown while standard error is a terminal.
+/// A progress bar, which shows if standard error is a terminal.
 fn progress_bar(slabs: u64) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} to go");
     ProgressBar::new(slabs).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))

@@ -6,13 +6,13 @@ use crate::args::Args;
 use crate::error::Error;
 use crate::input::Volume;
 
-/// From the mesher's lattice, in the order of the file's memory, to positions: the sample's number times the spacing,
-/// from the origin on.
+/// The map from the mesher's lattice, whose axes are in the file's order, to positions: the origin plus the sample's
+/// number times the spacing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Transform {
-    /// Whether the file's fastest axis is z.
+    /// True if the file's fastest axis is z.
     z_fastest: bool,
-    /// Whether normals point to smaller values.
+    /// True if normals point to smaller values.
     invert: bool,
     spacing: [f64; 3],
     /// The first sample's position.
@@ -23,8 +23,8 @@ pub(crate) struct Transform {
 
 impl Transform {
     /// # Errors
-    /// [`Error::Spacing`] where the far end of the volume lies beyond 32-bit numbers, or steps within a cell below
-    /// them; [`Error::Origin`] where an end of it does as far from the origin.
+    /// [`Error::Spacing`] if the far end of the volume lies beyond 32-bit numbers, or if steps within a cell are too
+    /// small for them; [`Error::Origin`] if the origin moves an end of the volume beyond 32-bit numbers.
     pub(crate) fn new(args: &Args, volume: &Volume) -> Result<Self, Error> {
         for axis in 0..3 {
             let (spacing, origin, samples) = (args.spacing[axis], args.origin[axis], volume.size[axis]);
@@ -41,7 +41,7 @@ impl Transform {
         Ok(Self { z_fastest: volume.z_fastest, invert: args.invert, spacing, origin, margin })
     }
 
-    /// Moves a piece of the mesh.
+    /// Transforms a piece of the mesh.
     pub(crate) fn apply(&self, mesh: &mut MeshBuffer) {
         for position in &mut mesh.positions {
             *position = self.position(*position);
@@ -49,7 +49,7 @@ impl Transform {
         for normal in &mut mesh.normals {
             *normal = self.normal(self.ordered(*normal));
         }
-        // Exchanging two axes is a reflection, which turns triangles over as well.
+        // Exchanging two axes is a reflection, which turns triangles over, too.
         if self.invert != self.z_fastest {
             for triangle in mesh.indices.as_chunks_mut::<3>().0 {
                 triangle.swap(1, 2);
@@ -57,7 +57,7 @@ impl Transform {
         }
     }
 
-    /// Where samples of the mesher's lattice are; to the last bit the coordinates that vertices beside them have.
+    /// The positions of samples of the mesher's lattice, rounded exactly like those of vertices.
     pub(crate) fn corners(&self, samples: [[u32; 3]; 2]) -> [[f32; 3]; 2] {
         samples.map(|sample| self.position(sample.map(|v| v as f32)))
     }
@@ -75,7 +75,7 @@ impl Transform {
         if self.z_fastest { [c, b, a] } else { [a, b, c] }
     }
 
-    /// A gradient is a difference per distance: along an axis of wider spacing it is smaller.
+    /// The transformed normal. It is a gradient, a difference per distance, so wider spacing makes it smaller.
     fn normal(&self, normal: [f32; 3]) -> [f32; 3] {
         let normal = if self.invert { normal.map(|v| -v) } else { normal };
         let [x, y, z] = self.spacing;

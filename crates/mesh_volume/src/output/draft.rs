@@ -10,26 +10,26 @@ use crate::args::folder;
 
 const BUFFER: usize = 1 << 18;
 
-/// How much is copied between two looks at whether to go on.
+/// The number of bytes copied between two checks for an interruption.
 const PIECE: u64 = 1 << 24;
 
-/// A file in the making, in the folder where it is to be. Dropped before its end, it leaves nothing there.
+/// An unfinished file in its final folder. If it is dropped before it is finished, it leaves nothing behind.
 pub(super) struct Draft {
     /// The header and the body.
     body: BufWriter<File>,
-    /// What comes behind the body; a file without a name.
+    /// The part after the body, in a file without a name.
     tail: BufWriter<File>,
-    /// The name of the first file until it is whole. Last, so that it is closed before it is removed.
+    /// The temporary name of the first file. The last field, so that the file is closed before it is removed.
     name: TempPath,
 }
 
 impl Draft {
-    /// Begins a file with room for a header of `header` bytes.
+    /// Begins a file with space for a header of `header` bytes.
     pub(super) fn create(path: &Path, header: usize) -> io::Result<Self> {
         let folder = folder(path);
         let mut builder = Builder::new();
         builder.prefix(".mesh_volume.").suffix(".part");
-        // Temporary files are otherwise for their owner's eyes only, and so would the mesh be.
+        // By default only the owner may read a temporary file, and so it would be with the mesh.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let (file, name) = builder.tempfile_in(folder)?.into_parts();
@@ -39,13 +39,13 @@ impl Draft {
         Ok(Self { body, tail, name })
     }
 
-    /// Where to write the body and the tail.
+    /// The writers of the body and of the tail.
     pub(super) fn parts(&mut self) -> (&mut dyn Write, &mut dyn Write) {
         (&mut self.body, &mut self.tail)
     }
 
-    /// Joins both parts and puts the header before them; what is returned is the whole file's name until it is in its
-    /// place. Where `go_on` no longer holds, it is [`io::ErrorKind::Interrupted`].
+    /// Joins both parts and writes the header before them. Returns the complete file's temporary name, or
+    /// [`io::ErrorKind::Interrupted`] as soon as `go_on` returns false.
     pub(super) fn finish(mut self, header: &[u8], go_on: impl Fn() -> bool) -> io::Result<TempPath> {
         self.body.flush()?;
         self.tail.flush()?;
@@ -58,7 +58,7 @@ impl Draft {
         }
         file.rewind()?;
         file.write_all(header)?;
-        // Some file systems say only now that they are full.
+        // Some file systems report only now that they are full.
         file.sync_all()?;
         Ok(self.name)
     }

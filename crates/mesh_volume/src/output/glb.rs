@@ -11,11 +11,11 @@ use marchless::MeshBuffer;
 
 use super::{Encoder, OutputError, bytes};
 
-/// Before the JSON: the file's magic, version and length, and the chunk's length and kind.
+/// The number of bytes before the JSON: the file's magic, version and length, and the chunk's length and kind.
 const BEFORE_JSON: usize = 20;
-/// Room for the JSON, which spaces fill up.
+/// The space for the JSON, which is padded with spaces.
 const JSON: usize = 1536;
-/// After it: the length and kind of the chunk of vertices and indices.
+/// The number of bytes after the JSON: the length and kind of the chunk of vertices and indices.
 const AFTER_JSON: usize = 8;
 
 const VERTEX: u64 = 24;
@@ -55,7 +55,7 @@ impl Encoder for Glb {
     fn header(&self) -> Result<Vec<u8>, OutputError> {
         let length = self.length()?;
         let binary = length - self.header_length() as u32;
-        // glTF knows no empty arrays, and no chunk for them: then the JSON reaches to the end of the file.
+        // glTF has neither empty arrays nor an empty chunk for them. The JSON then reaches to the end of the file.
         let json = if binary == 0 { JSON + AFTER_JSON } else { JSON };
         let mut header = [&b"glTF"[..], &2u32.to_le_bytes(), &length.to_le_bytes()].concat();
         header.extend((json as u32).to_le_bytes());
@@ -71,7 +71,7 @@ impl Encoder for Glb {
 }
 
 impl Glb {
-    /// How long the file is.
+    /// The length of the file in bytes.
     fn length(&self) -> Result<u32, OutputError> {
         let length = self.header_length() as u64 + self.vertices * VERTEX + self.triangles * TRIANGLE;
         u32::try_from(length).map_err(|_| OutputError::GlbTooLong)

@@ -16,7 +16,7 @@ impl Encoder for Obj {
     }
 
     fn encode(&mut self, piece: &MeshBuffer, body: &mut dyn Write, tail: &mut dyn Write) -> Result<(), OutputError> {
-        // The shortest digits that give the same numbers back.
+        // `Display` writes the shortest digits that parse to the same number.
         for ([x, y, z], [nx, ny, nz]) in piece.positions.iter().zip(&piece.normals) {
             writeln!(body, "v {x} {y} {z}\nvn {nx} {ny} {nz}")?;
         }

@@ -6,7 +6,7 @@ use marchless::MeshBuffer;
 
 use super::{Encoder, OutputError, bytes};
 
-/// The length of any header, which a comment fills up.
+/// The length of every header, which is padded with a comment.
 const HEADER: usize = 352;
 
 #[derive(Default)]
@@ -45,7 +45,7 @@ impl Encoder for Ply {
              end_header\n",
             self.vertices, self.triangles
         );
-        // Two counts of 20 digits, the longest there are, still fit.
+        // Two counts of 20 digits, the longest possible ones, fit.
         let width = HEADER - end.len();
         Ok(format!("{start:width$}{end}").into_bytes())
     }

@@ -1,4 +1,4 @@
-//! Binary STL: triangles that share nothing, each with a normal of its own.
+//! Binary STL: triangles without shared vertices, each with its own normal.
 
 use std::io::{self, Write};
 
@@ -7,7 +7,7 @@ use marchless::MeshBuffer;
 use super::{Encoder, OutputError, bytes};
 use crate::recent::Recent;
 
-/// Must not begin with "solid", as text files do.
+/// The title. It must not begin with "solid", as text files do.
 const TITLE: &[u8] = b"binary STL made by mesh_volume";
 
 pub(super) struct Stl {
@@ -53,7 +53,7 @@ impl Stl {
     }
 }
 
-/// The unit normal of a triangle whose corners run counter-clockwise; zero where rounding has left it no area.
+/// The unit normal of a triangle with counter-clockwise corners; zero if rounding left the triangle no area.
 fn normal(corners: [[f32; 3]; 3]) -> [f32; 3] {
     let [a, b, c] = corners.map(|corner| corner.map(f64::from));
     let [u, v] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1], end[2] - a[2]]);

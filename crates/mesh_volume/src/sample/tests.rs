@@ -1,16 +1,16 @@
-//! No sample changes sides, whatever the isovalue.
+//! No sample changes sides, for any isovalue.
 
 use marchless::Weight as _;
 use proptest::prelude::*;
 
 use super::Sample;
 
-/// That a weight lies below the weights' isovalue exactly where the sample lies below its own.
+/// Asserts that a weight lies below the weights' isovalue if and only if the sample lies below `iso`.
 fn assert_same_side<S: Sample>(bytes: &[u8], sample: f64, iso: f64) {
     assert_side::<S>(bytes, sample < iso, iso);
 }
 
-/// That a weight lies below the weights' isovalue exactly where its sample does, as `is_below` says.
+/// Asserts that a weight lies below the weights' isovalue if and only if `is_below` is true.
 fn assert_side<S: Sample>(bytes: &[u8], is_below: bool, iso: f64) {
     let mut weights = Vec::new();
     S::decode(bytes, iso, &mut weights);
@@ -19,7 +19,7 @@ fn assert_side<S: Sample>(bytes: &[u8], is_below: bool, iso: f64) {
     assert_eq!(weights[0].to_voxels() < isovalue, is_below, "{bytes:?} at {iso:e} became {:?}", weights[0]);
 }
 
-/// Isovalues of all kinds, and some that are close to the sample.
+/// Any isovalue, often one close to the sample.
 fn isovalue(sample: f64) -> impl Strategy<Value = f64> {
     let finite = |iso: &f64| iso.is_finite();
     prop_oneof![
@@ -64,7 +64,7 @@ proptest! {
         (sample, iso) in any::<i64>().prop_flat_map(|v: i64| (Just(v), isovalue(v as f64))),
         bits in 0..64u32,
     ) {
-        // A whole number lies below another number exactly where it lies below the next whole number up.
+        // A whole number lies below `iso` if and only if it lies below the next whole number above `iso`.
         let is_below = |sample: i128, iso: f64| sample < iso.ceil() as i128;
         let unsigned = sample.cast_unsigned();
         for iso in [iso, iso + 18446744073709551616.0] {

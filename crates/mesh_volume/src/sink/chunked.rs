@@ -24,7 +24,7 @@ pub(crate) struct ChunkedSink {
 
 impl ChunkedSink {
     /// # Errors
-    /// [`Error`] where something that is not to be replaced is in the place of a chunk's file.
+    /// [`Error`] if the place of a chunk's file has something that must not be replaced.
     pub(crate) fn new(args: &Args, chunks: Chunks, transform: Transform) -> Result<Self, Error> {
         Ok(Self {
             transform,

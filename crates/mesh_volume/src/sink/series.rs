@@ -9,19 +9,19 @@ use std::path::{Path, PathBuf};
 use crate::args::{Args, folder};
 use crate::error::Error;
 
-/// All numbers have this many digits, or more.
+/// The least number of digits in a file's name.
 const LEAST_DIGITS: usize = 4;
 
-/// The names of the chunks' files, and which of them are there from an earlier mesh.
+/// The names of the chunks' files, and the existing files of an earlier mesh.
 #[derive(Debug)]
 pub(super) struct Series {
     /// The name without a number: `OUT.ply` of `OUT.0000.ply`.
     output: PathBuf,
-    /// Of each number, so that the names are in the same order.
+    /// The digits of each number, so that the names sort like the numbers.
     digits: usize,
-    /// Chunks whose files are there, and have not been claimed.
+    /// Chunks whose files exist and have not been claimed.
     stale: BTreeSet<u64>,
-    /// Files with such a name, but another number.
+    /// Files with such a name whose number is no chunk of this mesh.
     foreign: BTreeSet<OsString>,
 }
 
@@ -29,12 +29,13 @@ impl Series {
     /// The names of `count` files.
     ///
     /// # Errors
-    /// [`Error`] where one of the names is that of the input or of something that is no file, or none can be had.
+    /// [`Error`] if a name is that of the input or of something that is not a file, or if the folder cannot hold such
+    /// names.
     pub(super) fn new(args: &Args, count: u64) -> Result<Self, Error> {
         let digits = (count.max(1) - 1).to_string().len().max(LEAST_DIGITS);
         let (stale, foreign) = (BTreeSet::new(), BTreeSet::new());
         let mut series = Self { output: args.output.clone(), digits, stale, foreign };
-        // Such a name may be too long.
+        // The number may make the name too long.
         let path = series.path(0);
         match path.symlink_metadata() {
             Err(source) if source.kind() != ErrorKind::NotFound => {
@@ -60,18 +61,18 @@ impl Series {
         Ok(series)
     }
 
-    /// The file of this chunk, which is no longer stale.
+    /// The path of a chunk's file; a file there is not stale any more.
     pub(super) fn claim(&mut self, number: u64) -> PathBuf {
         self.stale.remove(&number);
         self.path(number)
     }
 
-    /// The files that nobody has claimed.
+    /// The existing files of chunks that were not claimed.
     pub(super) fn stale(&self) -> Vec<PathBuf> {
         self.stale.iter().map(|&number| self.path(number)).collect()
     }
 
-    /// The first of the files that have a number, too, but not one of these chunks, and how many there are.
+    /// The first of the numbered files that are not chunks of this mesh, and their number.
     pub(super) fn foreign(&self) -> Option<(PathBuf, usize)> {
         self.foreign.first().map(|name| (self.output.with_file_name(name), self.foreign.len()))
     }
@@ -88,7 +89,7 @@ impl Series {
         name
     }
 
-    /// The number in a file's name that looks like these.
+    /// The number in a file's name; `None` if it is not a name of this series.
     fn number(&self, name: &Path) -> Option<u64> {
         let numbered = Path::new(name.file_stem()?);
         let digits = numbered.extension()?.to_str()?;

@@ -1,4 +1,4 @@
-//! [`WholeSink`]: one file for all of the mesh.
+//! [`WholeSink`]: one file for the whole mesh.
 
 use std::path::PathBuf;
 
@@ -21,19 +21,19 @@ pub(crate) struct WholeSink {
     kept: Option<Kept>,
 }
 
-/// What is kept for an examination.
+/// The data that a check needs.
 struct Kept {
-    /// What the mesh is called.
+    /// The path that the report shows.
     path: PathBuf,
-    /// All of it, but for the normals.
+    /// The whole mesh without its normals.
     mesh: MeshBuffer,
-    /// The box around the volume and its margin: where the mesh may be open.
+    /// The box around the volume and its margin; the mesh may be open in its faces.
     bounds: [[f32; 3]; 2],
 }
 
 impl WholeSink {
     /// # Errors
-    /// [`Error`] where no file can be made.
+    /// [`Error`] if no file can be created.
     pub(crate) fn new(args: &Args, volume: &Volume, transform: Transform) -> Result<Self, Error> {
         let kept = args.check.then(|| Kept {
             path: args.output.clone(),

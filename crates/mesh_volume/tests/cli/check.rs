@@ -1,4 +1,4 @@
-//! `--check`: a report of what is written, and nothing written where it is not clean.
+//! `--check`: a report of the mesh, and no output if the mesh is not clean.
 
 use crate::program::Folder;
 use crate::readers;
@@ -29,8 +29,8 @@ fn a_clean_mesh_is_reported_and_written() {
     }
 }
 
-/// Samples the only surface of which lies so far from the origin that 32-bit positions have no room for it: around a
-/// layer of samples that are hardly inside.
+/// A volume whose only surface, around a layer of samples that are barely inside, lies too far from the origin for the
+/// resolution of 32-bit positions.
 fn far() -> Volume {
     Volume::new([17002, 2, 2], "u8", |[x, _, _]| if x == 17000 { 0.0 } else { 255.0 })
 }

@@ -1,4 +1,4 @@
-//! One mesh per chunk: what the whole mesh has in each of them, to the last bit; and all files or none.
+//! One mesh per chunk: equal to its part of the whole mesh, to the last bit; and all files are written or none.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,8 +21,8 @@ fn triangles(mesh: &Mesh) -> Vec<[Vertex; 3]> {
     mesh.indices.chunks_exact(3).map(|triangle| [0, 1, 2].map(|k| corner(&triangle[k]))).collect()
 }
 
-/// The whole mesh's triangles by the chunk that their middle lies in, the numbers of which run x fastest.
-/// What lies outside of the volume belongs to the nearest chunk.
+/// The whole mesh's triangles by the number of the chunk that their middle lies in, x fastest. Those outside the volume
+/// belong to the nearest chunk.
 fn by_chunk(whole: &Mesh, size: [usize; 3], cells: usize, spacing: [f64; 3]) -> BTreeMap<usize, Vec<[Vertex; 3]>> {
     let counts = size.map(|samples| (samples - 1).div_ceil(cells));
     let mut chunks: BTreeMap<_, Vec<_>> = BTreeMap::new();
@@ -64,7 +64,8 @@ fn bounds(number: usize, size: [usize; 3], cells: usize, spacing: [f64; 3], clos
     })
 }
 
-/// That each chunk is clean, has what the whole mesh has in it, and shares with its neighbours what lies on the border.
+/// Asserts that each chunk is clean, equals its part of the whole mesh, and has the same vertices as its neighbours on
+/// common borders.
 fn assert_chunks(
     chunks: &BTreeMap<usize, Mesh>,
     whole: &Mesh,
@@ -219,7 +220,7 @@ fn files_of_an_earlier_mesh_do_not_mix_with_the_new_one() {
     let (_, args) = ball(&folder);
     folder.mesh(&format!("{args} --iso 100 --chunk 8 -o o.ply"));
     let before = folder.names();
-    // Nothing else in the folder is anyone's business.
+    // Other files in the folder must stay.
     let others = ["o.ply", "o.000.ply", "o.0000.obj", "o.0000.ply.bak", "o.+000.ply", "p.0000.ply", ".o.0000.ply"];
     for name in others {
         folder.write(name, b"other");
@@ -231,7 +232,7 @@ fn files_of_an_earlier_mesh_do_not_mix_with_the_new_one() {
     assert_eq!(after, before);
     assert!(others.iter().all(|name| folder.read(name) == b"other"));
 
-    // Fewer and larger chunks leave behind what is not theirs, and say so.
+    // A mesh of fewer chunks leaves the other numbered files in place, and notes them.
     let noted = folder.mesh_noting(&format!("{args} --iso 100 --chunk 16 -o o.ply"));
     assert!(noted.starts_with("note: no chunk of this mesh, and so left as it was: o.0008.ply and "), "{noted}");
     let noted = folder.mesh_noting(&format!("{args} --iso 1e6 --chunk 16 -o o.ply"));

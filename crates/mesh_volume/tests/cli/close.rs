@@ -1,4 +1,4 @@
-//! `--close`: the mesh of the volume with a layer of samples around it that lie outside.
+//! `--close`: the mesh of the volume with a layer of outside samples around it.
 
 use std::collections::BTreeMap;
 
@@ -12,8 +12,8 @@ use crate::volumes::{TYPES, Volume, random};
 /// All types.
 const KINDS: [&str; 11] = ["bool", "i8", "u8", "i16", "u16", "i32", "u32", "i64", "u64", "f32", "f64"];
 
-/// The volume with that layer around it, as differences to the isovalue: each of the layer's samples is the nearest
-/// one of the volume, as far from the isovalue as that, but outside.
+/// The volume with that layer around it, as differences to the isovalue. Each sample of the layer is as far from the
+/// isovalue as the nearest one of the volume, but outside.
 fn padded(volume: &Volume, iso: f64, invert: bool) -> Volume {
     Volume::new(volume.size.map(|samples| samples + 2), "f32", |point| {
         let nearest = [0, 1, 2].map(|axis| point[axis].saturating_sub(1).min(volume.size[axis] - 1));

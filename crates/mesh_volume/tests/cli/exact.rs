@@ -1,4 +1,4 @@
-//! `--exact`: the topology of the trilinear interpolant, where the default separates.
+//! `--exact`: the topology of the trilinear interpolant in cells where the default separates.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::program::Folder;
 use crate::readers::{self, Mesh};
 use crate::volumes::{TYPES, Volume, random};
 
-/// What the program makes of a volume, by default and exactly, and both reports in the volume's box.
+/// The program's meshes of a volume, by default and with `--exact`, each with its report in the volume's box.
 fn both(volume: &Volume, iso: f64) -> [(Mesh, MeshReport); 2] {
     let folder = Folder::new();
     folder.write("v.raw", &volume.bytes());

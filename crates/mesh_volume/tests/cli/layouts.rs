@@ -1,9 +1,9 @@
-//! The same samples in other bytes are the same mesh: big-endian, behind a header, as bool and as 64-bit integers.
+//! Equal samples in different bytes give the same mesh: big-endian, after a header, as bool and as 64-bit integers.
 
 use crate::program::Folder;
 use crate::volumes::{TYPES, Volume, header, npy, numpy_type, random};
 
-/// NumPy's name for a type in another order of bytes.
+/// NumPy's name for a type in the given byte order.
 fn ordered(kind: &str, order: char) -> String {
     format!("{order}{}", &numpy_type(kind)[1..])
 }

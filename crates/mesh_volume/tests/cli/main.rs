@@ -1,5 +1,5 @@
-//! The program on the command line: every type of sample in every format is the mesh of the whole volume, and the
-//! surface lies between the same samples as in the file's own numbers.
+//! The program on the command line: every type of sample in every format gives the mesh of the whole volume, and the
+//! surface lies between the right samples, judged by the file's own numbers.
 
 mod check;
 mod chunks;
@@ -20,7 +20,7 @@ use program::Folder;
 use readers::Mesh;
 use volumes::{TYPES, Volume, random};
 
-/// What the mesher makes of the whole volume at once, as far as its numbers fit the weights of the core.
+/// The mesh of the whole volume at once, for numbers that fit the core's weights.
 fn whole(volume: &Volume, iso: f64) -> Mesh {
     fn mesh<W: Weight>(volume: &Volume, isovalue: f64, weight: impl Fn(f64) -> W) -> Mesh {
         let shape = Shape::new(volume.size.map(|n| n as u32)).expect("a small shape");
@@ -73,8 +73,8 @@ fn every_type_in_every_format_is_the_mesh_of_the_whole_volume() {
     }
 }
 
-/// That a facet's normal is of unit length, at right angles to it and on the side from which its corners run
-/// counter-clockwise.
+/// Asserts that a facet's normal has length 1, is perpendicular to the facet, and points to the side from which the
+/// corners run counter-clockwise.
 #[track_caller]
 fn assert_is_normal_of(normal: [f32; 3], facet: [[f32; 3]; 3]) {
     let normal = normal.map(f64::from);

@@ -1,4 +1,4 @@
-//! `--origin`: the same mesh elsewhere.
+//! `--origin`: moves the mesh and changes nothing else.
 
 use crate::program::Folder;
 use crate::readers;

@@ -6,10 +6,10 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
-/// Where the program is.
+/// The path of the program.
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_mesh_volume");
 
-/// A folder with volumes and what becomes of them; gone after the test.
+/// A temporary folder for volumes and meshes; removed after the test.
 pub(crate) struct Folder(TempDir);
 
 impl Folder {
@@ -29,7 +29,7 @@ impl Folder {
         fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// All that lies there, hidden files too.
+    /// The names of all files in the folder, including hidden ones.
     pub(crate) fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).expect("the folder of tests can be read");
         let mut names: Vec<_> =
@@ -45,12 +45,12 @@ impl Folder {
         command
     }
 
-    /// What the program makes of these arguments, split at spaces.
+    /// Runs the program with these arguments, split at spaces.
     pub(crate) fn run(&self, args: &str) -> Output {
         self.command().args(args.split_whitespace()).output().expect("the program can be run")
     }
 
-    /// Runs the program, which must succeed and say nothing that is wrong.
+    /// Runs the program, which must succeed and print nothing to standard error.
     #[track_caller]
     pub(crate) fn mesh(&self, args: &str) -> String {
         let output = self.run(args);
@@ -59,7 +59,7 @@ impl Folder {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Runs the program, which must succeed, but have something to note.
+    /// Runs the program, which must succeed and print a note.
     #[track_caller]
     pub(crate) fn mesh_noting(&self, args: &str) -> String {
         let output = self.run(args);
@@ -72,8 +72,8 @@ impl Folder {
         errors
     }
 
-    /// Runs the program, which must refuse with one sentence that has all of `because` in it, and leave all files as
-    /// they were.
+    /// Runs the program, which must refuse with one sentence that contains all of `because`, and leave all files
+    /// unchanged.
     #[track_caller]
     pub(crate) fn assert_refused(&self, args: &str, code: i32, because: &[&str]) {
         let before = self.names();

@@ -1,10 +1,10 @@
-//! Plain readers of what the program writes; strict, since they read nothing else.
+//! Plain readers of the program's formats. They are strict and accept only what the program writes.
 
 use std::collections::HashMap;
 
 use marchless::MeshReport;
 
-/// A mesh as it came out of a file.
+/// A mesh as read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Mesh {
     pub(crate) positions: Vec<[f32; 3]>,
@@ -23,7 +23,7 @@ impl Mesh {
         self.indices.chunks_exact(3).map(|triangle| [0, 1, 2].map(|k| corner(&triangle[k]))).collect()
     }
 
-    /// What the surface encloses; negative where its triangles look inwards.
+    /// The volume that the surface encloses; negative if its triangles face inwards.
     pub(crate) fn volume(&self) -> f64 {
         self.corners()
             .iter()
@@ -99,7 +99,7 @@ pub(crate) fn stl(file: &[u8]) -> (Vec<[[f32; 3]; 3]>, Vec<[f32; 3]>) {
     facets.unzip()
 }
 
-/// The facets as a mesh whose vertices are shared where they are in the same place.
+/// The facets as a mesh. Vertices in the same place become one.
 pub(crate) fn welded(facets: &[[[f32; 3]; 3]]) -> Mesh {
     let (mut mesh, mut known) = (Mesh::default(), HashMap::new());
     for &corner in facets.as_flattened() {
@@ -112,7 +112,7 @@ pub(crate) fn welded(facets: &[[[f32; 3]; 3]]) -> Mesh {
     mesh
 }
 
-/// The mesh, where there is one; with bounds that are those of its positions.
+/// The mesh, or `None` if the file has none. Checks that the bounds are those of the positions.
 pub(crate) fn glb(file: &[u8]) -> Option<Mesh> {
     assert_eq!(file[8..12], (file.len() as u32).to_le_bytes());
     let gltf = gltf::Gltf::from_slice(file).expect("valid glTF");

@@ -62,7 +62,7 @@ fn isovalues_below_zero_need_no_tricks() {
         // Samples of -3 lie on the surface, and so outside; crossings stay off them by 1/1024.
         assert!(mesh.positions.iter().all(|p| (p[0] - 2.0).abs() < 0.002), "{iso}: {:?}", mesh.positions[0]);
         assert_eq!((mesh.positions.len(), mesh.indices.len()), (36, 150));
-        // A wish that is no number must not swallow the next flag.
+        // A missing isovalue must not swallow the next flag.
         folder.assert_refused(&format!("v.raw {} --iso -o p.ply", volume.flags()), 2, &["p.ply"]);
     }
 }
@@ -172,7 +172,7 @@ fn bad_numpy_files_are_refused() {
     ] {
         assert_header_refused(text, &["its .npy header"]);
     }
-    // Every byte of it counts, one way or another: no damage is a panic.
+    // Damage to any byte of the header must not cause a panic.
     for at in 0..file.len() - data.len() {
         for byte in [0, b'\'', b'9', 0xff] {
             let mut damaged = file.clone();

@@ -1,4 +1,4 @@
-//! Where the system has the say: files that replace others, a full disk, `Ctrl-C`, little memory.
+//! Conditions of the system: files that replace others, a full disk, `Ctrl-C`, little memory.
 
 use crate::program::Folder;
 use crate::readers;
@@ -45,7 +45,7 @@ mod unix {
     use super::*;
     use crate::program::PROGRAM;
 
-    /// Runs the program below a shell's limits.
+    /// Runs the program under a shell's limits.
     fn limited(folder: &Folder, limits: &str, args: &str) -> std::process::Output {
         let line = format!("{limits}; exec \"$0\" \"$@\"");
         let mut command = Command::new("sh");
@@ -130,7 +130,7 @@ mod unix {
         folder.mesh(&args);
         assert!(folder.path("o.0003.ply").is_symlink());
         assert!(readers::ply(&folder.read("elsewhere")).report().is_clean());
-        // The input is no one's to replace, nor to remove.
+        // The input must be neither replaced nor removed.
         link("v.raw", "o.0000.obj");
         folder.assert_refused(&args.replace("ply", "obj"), 2, &["o.0000.obj", "both the input and the output"]);
         assert_eq!(folder.read("v.raw"), volume.bytes());
@@ -161,10 +161,10 @@ mod unix {
     #[test]
     fn an_interruption_leaves_nothing_behind() {
         let folder = Folder::new();
-        // As long as many seconds of work, and nearly empty on the disk.
+        // Enough samples for many seconds of work, in a sparse file.
         let file = File::create(folder.path("v.raw")).expect("the folder of tests can be written");
         file.set_len(1 << 37).expect("files may have holes");
-        // A grain near its beginning, so that the first chunk has a surface.
+        // One sample differs near its beginning, so that the first chunk has a surface.
         file.write_all_at(&[1], 256 * 256 * 3 + 256 * 3 + 3).expect("there is room for a byte");
         let whole = "v.raw --shape 2048,2048,32768 --type u8 --iso 1 -o o.ply";
         let chunks = "v.raw --shape 256,256,2097152 --type u8 --iso 1 --chunk 128 -o o.ply";
@@ -188,8 +188,8 @@ mod unix {
         }
     }
 
-    /// A file of these many bytes per axis, with a ball of 255 in the middle of its first cube, and holes, which are 0,
-    /// away from it.
+    /// A sparse file of so many bytes per axis, with a ball of 255 in the middle of its first cube. The rest is holes,
+    /// which read as 0.
     fn sparse_ball(folder: &Folder, [size, depth, slabs]: [u64; 3], radius: i64) {
         let file = File::create(folder.path("v.raw")).expect("the folder of tests can be written");
         file.set_len(size * depth * slabs).expect("files may have holes");
@@ -208,7 +208,7 @@ mod unix {
         }
     }
 
-    /// Meshes such a ball in a process that can have no more than `mebibytes` of addresses.
+    /// Meshes such a ball in a process whose address space is limited to `mebibytes`.
     #[cfg(target_os = "linux")]
     fn mesh_in(mebibytes: u64, size: u64, radius: i64) {
         let folder = Folder::new();

@@ -1,9 +1,9 @@
-//! Volumes to be meshed: their samples, and the files that hold them.
+//! Volumes for the tests: their samples, and their bytes in files.
 
-/// The types of samples, as the program names them; but for bool, which has two values only.
+/// The types of samples, as the program names them, without bool, which has only two values.
 pub(crate) const TYPES: [&str; 10] = ["i8", "u8", "i16", "u16", "i32", "u32", "i64", "u64", "f32", "f64"];
 
-/// NumPy's names for them.
+/// NumPy's name for a type.
 pub(crate) fn numpy_type(kind: &str) -> &'static str {
     match kind {
         "bool" => "|b1",
@@ -30,7 +30,7 @@ pub(crate) struct Volume {
 }
 
 impl Volume {
-    /// Each sample from its position; those beyond the type's range stop at its ends.
+    /// A volume of `sample` at each position, clamped to the type's range.
     pub(crate) fn new(size: [usize; 3], kind: &'static str, sample: impl Fn([usize; 3]) -> f64) -> Self {
         let points = (0..size[2]).flat_map(|z| (0..size[1]).flat_map(move |y| (0..size[0]).map(move |x| [x, y, z])));
         let samples = points.map(|point| held(kind, sample(point))).collect();
@@ -55,25 +55,25 @@ impl Volume {
         self.samples.iter().flat_map(|&sample| bytes(self.kind, sample)).collect()
     }
 
-    /// The same with the bytes of each sample in big-endian order.
+    /// [`bytes`](Self::bytes) with each sample in big-endian order.
     pub(crate) fn big_endian_bytes(&self) -> Vec<u8> {
         let samples = self.samples.iter();
         samples.flat_map(|&sample| bytes(self.kind, sample).into_iter().rev().collect::<Vec<_>>()).collect()
     }
 
-    /// What the command line has to say of the bytes.
+    /// The flags that describe the bytes on the command line.
     pub(crate) fn flags(&self) -> String {
         let [x, y, z] = self.size;
         format!("--shape {x},{y},{z} --type {}", self.kind)
     }
 
-    /// As NumPy saves the array with the indices `[z][y][x]` in C order.
+    /// The `.npy` file of the array with the indices `[z][y][x]`, in C order.
     pub(crate) fn npy(&self, version: u8) -> Vec<u8> {
         let [x, y, z] = self.size;
         npy(version, &header(numpy_type(self.kind), false, &[z, y, x]), &self.bytes())
     }
 
-    /// As NumPy saves the same array in Fortran order.
+    /// The `.npy` file of the array with the indices `[z][y][x]`, in Fortran order.
     pub(crate) fn npy_fortran(&self) -> Vec<u8> {
         let [nx, ny, nz] = self.size;
         let points = (0..nx).flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])));
@@ -82,14 +82,14 @@ impl Volume {
     }
 }
 
-/// A header as NumPy writes it, without the spaces behind it.
+/// A header as NumPy writes it, without the trailing spaces.
 pub(crate) fn header(descr: &str, fortran_order: bool, shape: &[usize]) -> String {
     let order = if fortran_order { "True" } else { "False" };
     let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
     format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': ({}), }}", lengths.join(", "))
 }
 
-/// A `.npy` file of this header and data.
+/// A `.npy` file with this header and data.
 pub(crate) fn npy(version: u8, header: &str, data: &[u8]) -> Vec<u8> {
     let start = if version == 1 { 10 } else { 12 };
     let length = (start + header.len() + 1).next_multiple_of(64) - start;
@@ -100,12 +100,12 @@ pub(crate) fn npy(version: u8, header: &str, data: &[u8]) -> Vec<u8> {
     file
 }
 
-/// A number from 0 to 1 for each seed.
+/// A random number from 0 to 1 for each seed.
 pub(crate) fn random(seed: usize) -> f64 {
     fastrand::Rng::with_seed(seed as u64).f64()
 }
 
-/// What a sample of this type can hold of a number.
+/// The nearest number that a sample of this type can hold.
 fn held(kind: &str, number: f64) -> f64 {
     match kind {
         "bool" => f64::from(number >= 0.5),
