@@ -88,7 +88,7 @@ struct TrackedView {
 
 impl TrackedView {
     /// The borders of the reported part.
-    fn told(&self) -> Borders {
+    fn reported_borders(&self) -> Borders {
         if self.revealed > 0.0 { Borders::of(&self.view.within(self.revealed)) } else { Borders::default() }
     }
 }
@@ -104,24 +104,24 @@ impl Cover {
         self.drops
     }
 
-    /// Changes the view of one viewer; `None` removes it. `come` receives the chunks that may now be wanted more than
-    /// before, and how much of them; `go` receives those that may be wanted less, and how much at most. Some come
-    /// twice.
+    /// Changes the view of one viewer; `None` removes it. `entering` receives the chunks that may now be wanted more
+    /// than before, each with the residency wanted. `leaving` receives those that may be wanted less, each with the most
+    /// residency wanted. Some chunks are reported twice.
     ///
-    /// Nothing of a view that is new or differs a lot comes before it is [revealed](Self::reveal) ring by ring: it may
-    /// have any number of chunks.
+    /// Nothing of a view that is new or differs a lot is reported before it is [revealed](Self::reveal) ring by ring: it
+    /// may have any number of chunks.
     pub(crate) fn set(
         &mut self,
         id: ViewId,
         view: Option<View>,
-        come: impl FnMut([i32; 3], Residency),
-        go: impl FnMut([i32; 3], Residency),
+        entering: impl FnMut([i32; 3], Residency),
+        leaving: impl FnMut([i32; 3], Residency),
     ) {
         let old = self.views.remove(&id);
         let Some(view) = view else {
             self.partial.remove(&id);
             if let Some(old) = old {
-                Borders::default().go(&old.borders, go);
+                Borders::default().report_leaving(&old.borders, leaving);
             }
             return;
         };
@@ -138,10 +138,10 @@ impl Cover {
         let revealed = former.map_or(0.0, |old| old.revealed);
         let mut hidden = 0;
         match former {
-            Some(old) if revealed >= 1.0 => borders.come(&old.borders, come),
+            Some(old) if revealed >= 1.0 => borders.report_entering(&old.borders, entering),
             Some(old) if revealed > 0.0 => {
                 let now = Borders::of(&view.within(revealed));
-                now.come(&old.told(), come);
+                now.report_entering(&old.reported_borders(), entering);
                 hidden = borders.len_beyond(&now);
             }
             _ => hidden = borders.len_beyond(&Borders::default()),
@@ -150,7 +150,7 @@ impl Cover {
             self.partial.insert(id);
         }
         if let Some(old) = &old {
-            borders.go(&old.borders, go);
+            borders.report_leaving(&old.borders, leaving);
         }
         self.views.insert(id, TrackedView { view, borders, revealed, hidden });
     }
@@ -166,17 +166,17 @@ impl Cover {
     }
 
     /// Reports one more ring of a view that is only partly revealed.
-    pub(crate) fn reveal(&mut self, id: ViewId, come: impl FnMut([i32; 3], Residency)) {
-        let Some(watched) = self.views.get_mut(&id) else { return };
-        let before = watched.told();
-        watched.revealed = watched.view.next_ring(watched.revealed);
-        if watched.revealed < 1.0 {
-            let now = watched.told();
-            now.come(&before, come);
-            watched.hidden = watched.borders.len_beyond(&now);
+    pub(crate) fn reveal(&mut self, id: ViewId, entering: impl FnMut([i32; 3], Residency)) {
+        let Some(tracked) = self.views.get_mut(&id) else { return };
+        let before = tracked.reported_borders();
+        tracked.revealed = tracked.view.next_ring(tracked.revealed);
+        if tracked.revealed < 1.0 {
+            let now = tracked.reported_borders();
+            now.report_entering(&before, entering);
+            tracked.hidden = tracked.borders.len_beyond(&now);
         } else {
-            watched.borders.come(&before, come);
-            watched.hidden = 0;
+            tracked.borders.report_entering(&before, entering);
+            tracked.hidden = 0;
             self.partial.remove(&id);
         }
     }
@@ -188,8 +188,8 @@ impl Cover {
 
     /// The chunks in range that have not been reported.
     pub(crate) fn hidden_in_range(&self, mut take: impl FnMut([i32; 3])) {
-        for watched in self.partial.iter().filter_map(|id| self.views.get(id)) {
-            watched.borders.come(&watched.told(), |position, wanted| {
+        for tracked in self.partial.iter().filter_map(|id| self.views.get(id)) {
+            tracked.borders.report_entering(&tracked.reported_borders(), |position, wanted| {
                 if wanted == Residency::Mesh {
                     take(position);
                 }
@@ -202,8 +202,8 @@ impl Cover {
         self.near(position).any(|view| view.range.grown(0.0).contains(position))
     }
 
-    /// The residency that the views ask for, for a chunk that has residency `now`. A viewer's margin keeps what is
-    /// there.
+    /// The residency that the views ask for, for a chunk that has residency `now`. A viewer's margin keeps the residency
+    /// that a chunk has.
     pub(crate) fn wanted(&self, position: [i32; 3], now: Residency) -> Residency {
         let asked = self.near(position).map(|view| {
             let grown = |by: f64| view.range.grown(by).contains(position);
@@ -237,7 +237,7 @@ impl Cover {
 
     /// The viewer for which a chunk is most urgent, and its urgency there: lower comes sooner.
     pub(crate) fn most_urgent(&self, position: [i32; 3]) -> Option<(ViewId, u32)> {
-        let views = self.views.iter().map(|(id, watched)| (id, &watched.view));
+        let views = self.views.iter().map(|(id, tracked)| (id, &tracked.view));
         let near = views.filter(|(_, view)| view.bounds().contains(position));
         near.map(|(id, view)| (*id, view.urgency(position))).min_by_key(|(_, urgency)| *urgency)
     }
@@ -249,12 +249,12 @@ impl Cover {
 
     /// An upper bound of the number of chunks in all views together; exact where views do not overlap.
     pub(crate) fn size(&self) -> f64 {
-        self.views.values().map(|watched| watched.view.range.box_size()).sum()
+        self.views.values().map(|tracked| tracked.view.range.box_size()).sum()
     }
 
     /// The views that may ask for anything of a chunk.
     fn near(&self, position: [i32; 3]) -> impl Iterator<Item = &View> + '_ {
-        self.views.values().map(|watched| &watched.view).filter(move |view| view.bounds().contains(position))
+        self.views.values().map(|tracked| &tracked.view).filter(move |view| view.bounds().contains(position))
     }
 }
 
@@ -302,53 +302,53 @@ mod tests {
     /// A change of one viewer.
     #[derive(Clone, Debug)]
     enum Step {
-        Becomes(Viewer),
-        Moves([f64; 3]),
-        Goes,
+        Set(Viewer),
+        Move([f64; 3]),
+        Remove,
     }
 
     fn step() -> impl Strategy<Value = Step> {
         let moves = prop::array::uniform3(-1.0..1.0f64);
-        prop_oneof![3 => viewer().prop_map(Step::Becomes), 6 => moves.prop_map(Step::Moves), 1 => Just(Step::Goes)]
+        prop_oneof![3 => viewer().prop_map(Step::Set), 6 => moves.prop_map(Step::Move), 1 => Just(Step::Remove)]
     }
 
-    /// Chunks that follow the cover's reports, as a terrain's do.
+    /// Chunks that follow the cover's reports, like those of a terrain.
     #[derive(Default)]
     struct Followers {
-        there: BTreeMap<[i32; 3], Residency>,
-        /// The chunks to be looked at.
-        told: BTreeSet<[i32; 3]>,
+        residencies: BTreeMap<[i32; 3], Residency>,
+        /// The reported chunks that have not followed yet.
+        reported: BTreeSet<[i32; 3]>,
         /// The chunks whose samples were wanted again after they may have been dropped.
         sampled: BTreeSet<[i32; 3]>,
     }
 
     impl Followers {
         fn of(&self, position: [i32; 3]) -> Residency {
-            self.there.get(&position).copied().unwrap_or(Residency::Gone)
+            self.residencies.get(&position).copied().unwrap_or(Residency::Gone)
         }
 
-        fn come(&mut self, position: [i32; 3], wanted: Residency, drops: bool) {
+        fn enter(&mut self, position: [i32; 3], wanted: Residency, drops: bool) {
             if drops || self.of(position) < wanted {
-                self.told.insert(position);
+                self.reported.insert(position);
             }
         }
 
-        fn go(&mut self, position: [i32; 3], most: Residency, drops: bool) {
+        fn leave(&mut self, position: [i32; 3], most: Residency, drops: bool) {
             if self.of(position) > if drops { Residency::Gone } else { most } {
-                self.told.insert(position);
+                self.reported.insert(position);
             }
         }
 
         fn reveal(&mut self, cover: &mut Cover) {
             let (partial, drops) = (cover.partial().collect::<Vec<_>>(), cover.drops_samples());
             for id in partial {
-                cover.reveal(id, |position, wanted| self.come(position, wanted, drops));
+                cover.reveal(id, |position, wanted| self.enter(position, wanted, drops));
             }
         }
 
         fn follow(&mut self, cover: &Cover) {
-            for position in core::mem::take(&mut self.told) {
-                self.there.insert(position, cover.wanted(position, self.of(position)));
+            for position in core::mem::take(&mut self.reported) {
+                self.residencies.insert(position, cover.wanted(position, self.of(position)));
                 if cover.may_drop_samples(position) {
                     self.sampled.remove(&position);
                 } else if cover.wants_samples(position) {
@@ -360,7 +360,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn who_follows_what_it_is_told_is_as_it_is_wanted(
+        fn chunks_that_follow_all_reports_have_the_wanted_residency(
             steps in prop::collection::vec((0u32..3, step(), 0..7u32, any::<bool>()), 1..20),
         ) {
             let mut cover = Cover::default();
@@ -368,13 +368,13 @@ mod tests {
             let mut followers = Followers::default();
             for (viewer, step, rings, follows) in steps {
                 match step {
-                    Step::Becomes(settings) => _ = viewers.insert(viewer, settings),
-                    Step::Moves(offset) => {
+                    Step::Set(settings) => _ = viewers.insert(viewer, settings),
+                    Step::Move(offset) => {
                         viewers.entry(viewer).and_modify(|settings: &mut Viewer| {
                             settings.middle = [0, 1, 2].map(|axis| settings.middle[axis] + offset[axis]);
                         });
                     }
-                    Step::Goes => _ = viewers.remove(&viewer),
+                    Step::Remove => _ = viewers.remove(&viewer),
                 }
                 let view = viewers.get(&viewer).map(Viewer::view);
                 let drops = cover.drops_samples() || view.is_some_and(|view| view.samples.is_some());
@@ -382,8 +382,8 @@ mod tests {
                 cover.set(
                     Entity::from_raw_u32(viewer),
                     view,
-                    |position, wanted| shared.borrow_mut().come(position, wanted, drops),
-                    |position, most| shared.borrow_mut().go(position, most, drops),
+                    |position, wanted| shared.borrow_mut().enter(position, wanted, drops),
+                    |position, most| shared.borrow_mut().leave(position, most, drops),
                 );
                 (0..rings).for_each(|_| followers.reveal(&mut cover));
                 if follows {
@@ -407,7 +407,7 @@ mod tests {
         }
 
         #[test]
-        fn bounds_hold_all_that_a_view_asks_for(viewer in viewer()) {
+        fn bounds_hold_all_chunks_that_a_view_asks_for(viewer in viewer()) {
             let (mut cover, view) = (Cover::default(), viewer.view());
             cover.set(None, Some(view), |_, _| {}, |_, _| {});
             for position in EXTENT.grown(3, 3).points() {

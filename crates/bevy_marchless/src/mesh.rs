@@ -128,12 +128,12 @@ fn mesh_terrains(
         bytes: 0,
         edits: Duration::ZERO,
     };
-    for (terrain, mut volume) in &mut volumes {
+    for (entity, mut volume) in &mut volumes {
         let heart = volume.heart();
         if (heart.has_meshed() || heart.has_to_mesh())
             && let Some(voxel_size) = volume.settings().map(|settings| settings.voxel_size)
         {
-            update.mesh(&mut Drawing { terrain, voxel_size, heart: volume.heart_mut() });
+            update.mesh(&mut MeshedTerrain { entity, voxel_size, heart: volume.heart_mut() });
         }
     }
     let edits = update.edits;
@@ -168,31 +168,31 @@ struct MeshUpdate<'a, 'w, 's> {
     edits: Duration,
 }
 
-/// The terrain that is being meshed and shown.
-struct Drawing<'a> {
-    terrain: Entity,
+/// A terrain that is being meshed and shown.
+struct MeshedTerrain<'a> {
+    entity: Entity,
     voxel_size: f32,
     heart: &'a mut Heart,
 }
 
 impl MeshUpdate<'_, '_, '_> {
     /// Does all meshing and showing of one terrain.
-    fn mesh(&mut self, drawing: &mut Drawing) {
-        self.take_results(drawing);
+    fn mesh(&mut self, terrain: &mut MeshedTerrain) {
+        self.take_results(terrain);
         let start = Instant::now();
-        while let Some(prepared) = drawing.heart.next_changed() {
-            self.start(drawing, prepared);
+        while let Some(prepared) = terrain.heart.next_changed() {
+            self.start(terrain, prepared);
         }
         let edits = start.elapsed();
         (self.edits, self.until) = (self.edits + edits, self.until + edits);
-        drawing.heart.sort_ready(self.until);
-        self.first_meshes(drawing);
-        self.restyle(drawing);
-        self.transition(drawing);
+        terrain.heart.sort_ready(self.until);
+        self.first_meshes(terrain);
+        self.restyle(terrain);
+        self.transition(terrain);
     }
 
     /// Takes finished meshes from jobs, and shows the groups that are complete.
-    fn take_results(&mut self, drawing: &mut Drawing) {
+    fn take_results(&mut self, terrain: &mut MeshedTerrain) {
         loop {
             let bytes = Cell::new(self.bytes);
             let Self { until, max_upload_bytes, .. } = *self;
@@ -205,41 +205,41 @@ impl MeshUpdate<'_, '_, '_> {
                     stats.count_mesh(meshed.time);
                 }
             };
-            let complete = drawing.heart.take_meshed(may_take_more, note);
+            let complete = terrain.heart.take_meshed(may_take_more, note);
             self.bytes = bytes.get();
             let Some(group) = complete else { break };
             if group.gives_way() {
                 // Reserve time for the commands that run later.
                 self.until = self.until.checked_sub(ENTITY_TIME).unwrap_or(self.until);
             }
-            let shown = drawing.heart.show(group);
-            self.show(drawing, shown);
+            let shown = terrain.heart.show(group);
+            self.show(terrain, shown);
         }
     }
 
     /// Starts the first meshes of chunks, one by one, the most urgent first.
-    fn first_meshes(&mut self, drawing: &mut Drawing) {
+    fn first_meshes(&mut self, terrain: &mut MeshedTerrain) {
         let mut done = 0;
         while (done % 2 != 0 || done == 0 || Instant::now() < self.until)
-            && let Some((prepared, urgency)) = drawing.heart.next_first_mesh(self.in_flight)
+            && let Some((prepared, urgency)) = terrain.heart.next_first_mesh(self.in_flight)
         {
-            self.start_jobs(drawing, prepared, Priority::FirstMesh(urgency));
+            self.start_jobs(terrain, prepared, Priority::FirstMesh(urgency));
             done += 1;
         }
     }
 
     /// Starts meshing or colouring chunks again after a change of normals or colours, one by one.
-    fn restyle(&mut self, drawing: &mut Drawing) {
-        let style = self.presenter.style(drawing.heart.colors());
+    fn restyle(&mut self, terrain: &mut MeshedTerrain) {
+        let style = self.presenter.style(terrain.heart.colors());
         let mut done = 0;
         while (done == 0 || Instant::now() < self.until)
-            && let Some(restyle) = drawing.heart.next_restyle(self.in_flight, style.is_some())
+            && let Some(restyle) = terrain.heart.next_restyle(self.in_flight, style.is_some())
         {
             match restyle {
-                Restyle::Mesh(prepared) => self.start_jobs(drawing, prepared, Priority::Restyle),
+                Restyle::Mesh(prepared) => self.start_jobs(terrain, prepared, Priority::Restyle),
                 Restyle::Recolor(key, group, geometry) => {
-                    let (results, style) = (drawing.heart.meshed().clone(), style.clone());
-                    drawing.heart.start_recolor(group, |id| {
+                    let (results, style) = (terrain.heart.mesh_results().clone(), style.clone());
+                    terrain.heart.start_recolor(group, |id| {
                         self.queue.push(Priority::Restyle, move || {
                             results.push(MeshResult::OfGroup(id, recolor(key.position, geometry, style.as_ref())));
                         })
@@ -251,55 +251,55 @@ impl MeshUpdate<'_, '_, '_> {
     }
 
     /// Continues the change to another isovalue, and ends it if it may end.
-    fn transition(&mut self, drawing: &mut Drawing) {
-        if drawing.heart.may_end_transition(self.inline) {
-            self.end_transition(drawing);
+    fn transition(&mut self, terrain: &mut MeshedTerrain) {
+        if terrain.heart.may_end_transition(self.inline) {
+            self.end_transition(terrain);
         }
         let mut done = 0;
         while (done == 0 || Instant::now() < self.until)
-            && let Some((key, job, settings)) = drawing.heart.next_in_transition(self.in_flight)
+            && let Some((key, job, settings)) = terrain.heart.next_in_transition(self.in_flight)
         {
-            let samples = drawing.heart.samples().neighbourhood(key.position).to_neighbourhood();
-            let style = self.presenter.style(drawing.heart.colors());
-            let (results, appearance) = (drawing.heart.meshed().clone(), drawing.heart.appearance());
+            let samples = terrain.heart.samples().neighbourhood(key.position).to_neighbourhood();
+            let style = self.presenter.style(terrain.heart.colors());
+            let (results, appearance) = (terrain.heart.mesh_results().clone(), terrain.heart.appearance());
             let ticket = self.queue.push(Priority::Restyle, move || {
                 let meshed = mesh_chunk(&samples.view(), key.position, &settings, style.as_ref(), None);
                 results.push(MeshResult::Restyled(Restyled { job, meshed, appearance }));
             });
-            drawing.heart.started_in_transition(key, job, ticket);
+            terrain.heart.started_in_transition(key, job, ticket);
             done += 1;
         }
     }
 
     /// Meshes the chunks that are still missing at the new isovalue, and shows all of them.
-    fn end_transition(&mut self, drawing: &mut Drawing) {
-        let style = self.presenter.style(drawing.heart.colors());
-        while let Some((key, _, settings)) = drawing.heart.next_in_transition(usize::MAX) {
-            let samples = [(key.position, drawing.heart.samples().neighbourhood(key.position))];
+    fn end_transition(&mut self, terrain: &mut MeshedTerrain) {
+        let style = self.presenter.style(terrain.heart.colors());
+        while let Some((key, _, settings)) = terrain.heart.next_in_transition(usize::MAX) {
+            let samples = [(key.position, terrain.heart.samples().neighbourhood(key.position))];
             let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.presenter.pool);
             for meshed in meshed {
                 self.presenter.stats.count_mesh(meshed.time);
-                drawing.heart.meshed_in_transition(meshed);
+                terrain.heart.meshed_in_transition(meshed);
             }
         }
-        if let Some(shown) = drawing.heart.end_transition() {
-            self.show(drawing, shown);
+        if let Some(shown) = terrain.heart.end_transition() {
+            self.show(terrain, shown);
         }
     }
 
     /// Starts a group: meshes and shows a small one within this update, or starts jobs for a larger one.
-    fn start(&mut self, drawing: &mut Drawing, prepared: PreparedGroup) {
+    fn start(&mut self, terrain: &mut MeshedTerrain, prepared: PreparedGroup) {
         let count = prepared.to_mesh.len();
         if count > self.inline.min(self.inline_left) {
-            return self.start_jobs(drawing, prepared, Priority::Edit);
+            return self.start_jobs(terrain, prepared, Priority::Edit);
         }
         self.inline_left -= count;
-        let (settings, mut group) = (drawing.heart.mesh_settings(), prepared.group);
-        let style = self.presenter.style(drawing.heart.colors());
+        let (settings, mut group) = (terrain.heart.mesh_settings(), prepared.group);
+        let style = self.presenter.style(terrain.heart.colors());
         let samples: Vec<_> = prepared
             .to_mesh
             .iter()
-            .map(|position| (*position, drawing.heart.samples().neighbourhood(*position)))
+            .map(|position| (*position, terrain.heart.samples().neighbourhood(*position)))
             .collect();
         let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.presenter.pool);
         self.presenter.pool.prepare(meshed.iter().map(|meshed| &*meshed.geometry), style.is_some());
@@ -307,19 +307,19 @@ impl MeshUpdate<'_, '_, '_> {
             self.presenter.stats.count_mesh(meshed.time);
             group.push(meshed);
         }
-        let shown = drawing.heart.show(group);
-        self.show(drawing, shown);
+        let shown = terrain.heart.show(group);
+        self.show(terrain, shown);
     }
 
     /// Starts the jobs of a group; a group with nothing to mesh is shown at once.
-    fn start_jobs(&mut self, drawing: &mut Drawing, prepared: PreparedGroup, priority: Priority) {
+    fn start_jobs(&mut self, terrain: &mut MeshedTerrain, prepared: PreparedGroup, priority: Priority) {
         if prepared.to_mesh.is_empty() {
-            let shown = drawing.heart.show(prepared.group);
-            return self.show(drawing, shown);
+            let shown = terrain.heart.show(prepared.group);
+            return self.show(terrain, shown);
         }
-        let (results, settings) = (drawing.heart.meshed().clone(), drawing.heart.mesh_settings());
-        let style = self.presenter.style(drawing.heart.colors());
-        drawing.heart.start(prepared, |heart, id, position| {
+        let (results, settings) = (terrain.heart.mesh_results().clone(), terrain.heart.mesh_settings());
+        let style = self.presenter.style(terrain.heart.colors());
+        terrain.heart.start(prepared, |heart, id, position| {
             let samples = heart.samples().neighbourhood(position).to_neighbourhood();
             let (results, style) = (results.clone(), style.clone());
             self.queue.push(priority, move || {
@@ -330,8 +330,8 @@ impl MeshUpdate<'_, '_, '_> {
     }
 
     /// Carries out a group's swaps on its chunks' entities.
-    fn show(&mut self, drawing: &mut Drawing, shown: Shown) {
-        let cells = [drawing.heart.samples().shown().chunk_cells(); 3];
+    fn show(&mut self, terrain: &mut MeshedTerrain, shown: Shown) {
+        let cells = [terrain.heart.samples().shown().chunk_cells(); 3];
         for swap in shown.swaps {
             match swap.place {
                 ShowTarget::Nowhere => {}
@@ -344,9 +344,9 @@ impl MeshUpdate<'_, '_, '_> {
                 ShowTarget::New => {
                     let Swap { key, appearance, meshed, .. } = swap;
                     let geometry = meshed.geometry.clone();
-                    let chunk = new_chunk(drawing.terrain, key, cells[0], drawing.voxel_size);
+                    let chunk = new_chunk(terrain.entity, key, cells[0], terrain.voxel_size);
                     let entity = self.presenter.spawn(chunk, meshed, cells);
-                    drawing.heart.spawned(key, DrawnMesh { entity, geometry, appearance });
+                    terrain.heart.spawned(key, DrawnMesh { entity, geometry, appearance });
                 }
             }
         }

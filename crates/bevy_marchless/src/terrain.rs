@@ -210,7 +210,7 @@ impl Terrain {
     }
 
     /// The settings that determine the samples before any edit.
-    pub(crate) fn recipe(&self) -> SamplingSettings {
+    pub(crate) fn sampling_settings(&self) -> SamplingSettings {
         SamplingSettings {
             source: self.source.get().clone(),
             extent: self.chunk_region(),
@@ -221,7 +221,7 @@ impl Terrain {
 
     /// Whether both terrains have the same samples before any edit.
     fn has_samples_of(&self, other: &Self) -> bool {
-        self.recipe().has_samples_of(&other.recipe())
+        self.sampling_settings().has_samples_of(&other.sampling_settings())
     }
 
     /// Copies the settings of `other` that do not change the samples.

@@ -62,7 +62,7 @@ pub(crate) struct SamplingSettings {
 /// One terrain's state.
 pub(crate) struct Heart {
     /// `None` before the terrain's settings have been accepted.
-    recipe: Option<SamplingSettings>,
+    sampling_settings: Option<SamplingSettings>,
     samples: SampleStore,
     table: ChunkTable,
     groups: Groups,
@@ -100,17 +100,18 @@ pub(crate) struct Heart {
     has_shown: bool,
     /// The edits that late stamps have made in this update.
     late_edits: Vec<Edit>,
-    /// Results of jobs, and those that wait for an update with more time.
-    filled: Results<Filled>,
-    filled_later: VecDeque<Filled>,
-    meshed: Results<MeshResult>,
-    meshed_later: VecDeque<MeshResult>,
+    /// Results of sampling jobs, and those that wait for an update with more time.
+    fill_results: Results<Filled>,
+    deferred_fills: VecDeque<Filled>,
+    /// Results of meshing jobs, and those that wait for an update with more time.
+    mesh_results: Results<MeshResult>,
+    deferred_meshes: VecDeque<MeshResult>,
 }
 
 impl Default for Heart {
     fn default() -> Self {
         Self {
-            recipe: None,
+            sampling_settings: None,
             samples: SampleStore::default(),
             table: ChunkTable::new(Region::new([0; 3], [0; 3]), true),
             groups: Groups::default(),
@@ -133,21 +134,21 @@ impl Default for Heart {
             holds_stamps: false,
             has_shown: false,
             late_edits: Vec::new(),
-            filled: Results::default(),
-            filled_later: VecDeque::new(),
-            meshed: Results::default(),
-            meshed_later: VecDeque::new(),
+            fill_results: Results::default(),
+            deferred_fills: VecDeque::new(),
+            mesh_results: Results::default(),
+            deferred_meshes: VecDeque::new(),
         }
     }
 }
 
 impl Heart {
     /// A terrain without any loaded chunk. `meshing`: whether chunks are meshed at all.
-    pub(crate) fn new(recipe: SamplingSettings, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
+    pub(crate) fn new(settings: SamplingSettings, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
         Self {
-            samples: SampleStore::of(recipe.empty_grid()),
-            table: ChunkTable::new(recipe.extent, meshing),
-            recipe: Some(recipe),
+            samples: SampleStore::of(settings.empty_grid()),
+            table: ChunkTable::new(settings.extent, meshing),
+            sampling_settings: Some(settings),
             isovalue,
             appearance: Appearance::new(normals, colors),
             ..Self::default()
@@ -156,8 +157,8 @@ impl Heart {
 
     /// Replaces all samples by those of another source. Edits are lost; a drawn chunk stays until its new mesh is
     /// there. The chunks stay where they are.
-    pub(crate) fn refill(&mut self, recipe: SamplingSettings, isovalue: f32) {
-        self.samples.refill(recipe.empty_grid());
+    pub(crate) fn refill(&mut self, settings: SamplingSettings, isovalue: f32) {
+        self.samples.refill(settings.empty_grid());
         self.table.refill();
         self.groups.take_all();
         self.to_fill.clear();
@@ -165,18 +166,18 @@ impl Heart {
         self.remote.clear();
         self.crowded = UniqueQueue::default();
         self.bounds.clear();
-        self.filled_later.clear();
-        self.meshed_later.clear();
+        self.deferred_fills.clear();
+        self.deferred_meshes.clear();
         (self.sampling, self.has_shown, self.isovalue) = (0, false, isovalue);
         (self.transition, self.next_isovalue) = (None, None);
-        self.recipe = Some(recipe);
+        self.sampling_settings = Some(settings);
         let Self { table, arriving, cover, .. } = self;
         table.keys().for_each(|key| arriving.add(key, cover));
     }
 
     /// The chunks that exist; `None` before the terrain's settings have been accepted.
     pub(crate) fn extent(&self) -> Option<Region> {
-        self.recipe.as_ref().map(|recipe| recipe.extent)
+        self.sampling_settings.as_ref().map(|settings| settings.extent)
     }
 
     /// Whether the next source may begin: every chunk that existed when the present source began has been shown with
@@ -207,13 +208,13 @@ impl Heart {
     }
 
     /// The queue of results from sampling jobs.
-    pub(crate) const fn filled(&self) -> &Results<Filled> {
-        &self.filled
+    pub(crate) const fn fill_results(&self) -> &Results<Filled> {
+        &self.fill_results
     }
 
     /// The queue of results from meshing jobs.
-    pub(crate) const fn meshed(&self) -> &Results<MeshResult> {
-        &self.meshed
+    pub(crate) const fn mesh_results(&self) -> &Results<MeshResult> {
+        &self.mesh_results
     }
 
     /// The settings of meshes that start now.
@@ -251,7 +252,7 @@ impl Heart {
     pub(crate) fn is_filled(&self) -> bool {
         let have_come = self.cover.is_revealed() && self.arriving.is_empty();
         let is_idle = have_come && self.leaving.is_empty() && self.remote.is_empty();
-        self.recipe.is_some()
+        self.sampling_settings.is_some()
             && self.table.counts().unfilled == 0
             && is_idle
             && self.crowded.is_empty()

@@ -144,7 +144,7 @@ impl GrownLoadRegion {
         Rows::new(from, y_squares.len(), spans)
     }
 
-    /// The positions along an axis of chunks that come within `radius` of the middle.
+    /// The positions, along an axis, of chunks that reach within `radius` of the middle.
     fn reach(&self, axis: usize, radius: f64) -> ops::Range<i32> {
         let (middle, extent) = (self.range.middle[axis], &self.range.extent);
         let from = floor(-(middle - radius - 1.0 - self.by)).saturating_neg();
@@ -234,21 +234,21 @@ impl View {
     /// The part of the radii that reaches about a chunk farther than `part`; 1 if nothing lies beyond.
     pub(super) fn next_ring(&self, part: f64) -> f64 {
         let LoadRegion { middle, radii, .. } = self.range;
-        let there = self.range.grown(0.0).bounds();
-        if there.is_empty() {
+        let existing = self.range.grown(0.0).bounds();
+        if existing.is_empty() {
             return 1.0;
         }
         // The distances of the nearest and the farthest existing points from the middle, in radii.
         let [nearest, farthest] = [false, true].map(|is_farthest| {
             let squares = (0..3).map(|axis| {
-                let ends = [there.min[axis], there.max[axis]].map(|end| f64::from(end) - middle[axis]);
+                let ends = [existing.min[axis], existing.max[axis]].map(|end| f64::from(end) - middle[axis]);
                 let nearest = 0.0f64.clamp(ends[0], ends[1]).abs();
                 let distance = if is_farthest { ends[0].abs().max(ends[1].abs()) } else { nearest };
                 (distance / radii[axis]).powi(2)
             });
             squares.sum::<f64>().sqrt().min(1.0)
         });
-        let size = there.size().into_iter().max().unwrap_or(1);
+        let size = existing.size().into_iter().max().unwrap_or(1);
         let rings = f64::from((size / 2).clamp(1, MOST_RINGS));
         let next = part.max(nearest) + (farthest - nearest) / rings;
         if next < farthest { next.max(f64::MIN_POSITIVE) } else { 1.0 }

@@ -10,17 +10,18 @@ use super::{Cover, View, ViewId};
 use crate::chunk::ChunkKey;
 
 /// The number of a viewer's chunks that are sorted at once.
-const SOON: usize = 256;
-/// The least number of a viewer's entries at which stale ones are pruned; then it is twice the number that was left.
-const FEW: usize = 1024;
+const SORTED_AT_ONCE: usize = 256;
+/// The least length of a viewer's backlog at which stale entries are pruned. The next time it is twice the length left,
+/// and this many more.
+const LEAST_TO_PRUNE: usize = 1024;
 
 /// A priority queue that holds each chunk once. Viewers take turns, and each has its chunks in order of urgency.
 ///
-/// Thousands of chunks may wait while few have their turn, and urgency changes with each step of a viewer. So only the
-/// chunks that come soon are sorted, and only for a viewer that has moved.
+/// Thousands of chunks may be pending while few have their turn, and urgency changes with each step of a viewer. So only
+/// the most urgent chunks are sorted, and only for a viewer that has moved.
 #[derive(Debug, Default)]
 pub(crate) struct ChunkQueue {
-    /// The chunks that come before all others.
+    /// The chunks that are popped before all others.
     first: UniqueQueue,
     /// The queue of each viewer; that of `None` also holds the chunks that no viewer sees.
     queues: BTreeMap<ViewId, PriorityQueue>,
@@ -70,10 +71,10 @@ impl ChunkQueue {
 
     /// The number of chunks in a viewer's queue.
     pub(crate) fn len_of(&self, id: ViewId) -> usize {
-        self.queues.get(&id).map_or(0, |queue| queue.soon.len() + queue.later.len())
+        self.queues.get(&id).map_or(0, |queue| queue.urgent.len() + queue.backlog.len())
     }
 
-    /// All chunks, in no order; a chunk that was moved to the front may come twice.
+    /// All chunks, in no order; a chunk that was moved to the front may occur twice.
     pub(crate) fn iter(&self) -> impl Iterator<Item = ChunkKey> + '_ {
         self.first.keys.iter().chain(&self.members).copied()
     }
@@ -95,10 +96,10 @@ impl ChunkQueue {
         self.first.push(key);
     }
 
-    /// Adds one of many chunks of a viewer, to be sorted later.
+    /// Adds one of many chunks of a viewer to the viewer's backlog.
     pub(crate) fn add_unsorted(&mut self, key: ChunkKey, id: ViewId) {
         if self.members.insert(key) {
-            self.queues.entry(id).or_default().later.push(key);
+            self.queues.entry(id).or_default().backlog.push(key);
         }
     }
 
@@ -111,17 +112,17 @@ impl ChunkQueue {
 
     /// Hands the chunks of a removed viewer to others.
     pub(crate) fn remove_view(&mut self, id: ViewId, cover: &Cover) {
-        let Some(PriorityQueue { soon, later, .. }) = self.queues.remove(&id) else { return };
-        for key in soon.into_iter().map(|(_, Reverse(key))| key).chain(later) {
+        let Some(PriorityQueue { urgent, backlog, .. }) = self.queues.remove(&id) else { return };
+        for key in urgent.into_iter().map(|(_, Reverse(key))| key).chain(backlog) {
             self.members.remove(&key);
             self.add(key, cover);
         }
     }
 
-    /// Takes out the next chunk that still `waits`.
-    pub(crate) fn pop(&mut self, cover: &Cover, waits: impl Fn(&ChunkKey) -> bool) -> Option<ChunkKey> {
+    /// Takes out the next chunk that is still pending.
+    pub(crate) fn pop(&mut self, cover: &Cover, is_pending: impl Fn(&ChunkKey) -> bool) -> Option<ChunkKey> {
         while let Some(key) = self.first.pop() {
-            if waits(&key) {
+            if is_pending(&key) {
                 return Some(key);
             }
         }
@@ -134,7 +135,7 @@ impl ChunkQueue {
             let id = queues.range(behind).map(|(id, _)| *id).next().or_else(|| queues.keys().next().copied())?;
             *last = id;
             let Entry::Occupied(mut queue) = queues.entry(id) else { return None };
-            let key = queue.get_mut().pop(cover.view(id), members, &waits);
+            let key = queue.get_mut().pop(cover.view(id), members, &is_pending);
             if key.is_some() {
                 return key;
             }
@@ -147,84 +148,90 @@ impl ChunkQueue {
 #[derive(Debug)]
 struct PriorityQueue {
     /// The most urgent chunks, the first one at the end.
-    soon: Vec<(Reverse<u32>, Reverse<ChunkKey>)>,
+    urgent: Vec<(Reverse<u32>, Reverse<ChunkKey>)>,
     is_sorted: bool,
-    later: Vec<ChunkKey>,
-    /// The threshold of urgency: no chunk in `later` has a lower one.
-    bar: u32,
-    /// The length of `later` at which stale entries are pruned.
+    /// All other chunks, unsorted.
+    backlog: Vec<ChunkKey>,
+    /// The threshold of urgency: no chunk in the backlog has a lower urgency.
+    threshold: u32,
+    /// The length of the backlog at which stale entries are pruned.
     prune_at: usize,
 }
 
 impl Default for PriorityQueue {
     fn default() -> Self {
-        Self { soon: Vec::new(), is_sorted: true, later: Vec::new(), bar: 0, prune_at: FEW }
+        Self { urgent: Vec::new(), is_sorted: true, backlog: Vec::new(), threshold: 0, prune_at: LEAST_TO_PRUNE }
     }
 }
 
 impl PriorityQueue {
     fn add(&mut self, key: ChunkKey, urgency: u32) {
-        if urgency < self.bar {
-            self.soon.push((Reverse(urgency), Reverse(key)));
+        if urgency < self.threshold {
+            self.urgent.push((Reverse(urgency), Reverse(key)));
             self.is_sorted = false;
         } else {
-            self.later.push(key);
+            self.backlog.push(key);
         }
     }
 
     fn sort_again(&mut self) {
-        self.later.extend(self.soon.drain(..).map(|(_, Reverse(key))| key));
-        self.bar = 0;
+        self.backlog.extend(self.urgent.drain(..).map(|(_, Reverse(key))| key));
+        self.threshold = 0;
     }
 
     fn pop(
         &mut self,
         view: Option<&View>,
         members: &mut HashSet<ChunkKey>,
-        waits: impl Fn(&ChunkKey) -> bool,
+        is_pending: impl Fn(&ChunkKey) -> bool,
     ) -> Option<ChunkKey> {
         loop {
-            if self.soon.len() > 2 * SOON {
+            if self.urgent.len() > 2 * SORTED_AT_ONCE {
                 self.sort_again();
             }
-            if self.soon.is_empty() {
-                self.choose(view, members, &waits);
+            if self.urgent.is_empty() {
+                self.select_urgent(view, members, &is_pending);
             }
             if !self.is_sorted {
-                self.soon.sort_unstable();
+                self.urgent.sort_unstable();
                 self.is_sorted = true;
             }
-            let (_, Reverse(key)) = self.soon.pop()?;
+            let (_, Reverse(key)) = self.urgent.pop()?;
             members.remove(&key);
-            if waits(&key) {
+            if is_pending(&key) {
                 return Some(key);
             }
         }
     }
 
-    /// Moves the most urgent chunks of `later` to `soon`.
-    fn choose(&mut self, view: Option<&View>, members: &mut HashSet<ChunkKey>, waits: impl Fn(&ChunkKey) -> bool) {
-        if self.later.len() >= self.prune_at {
-            self.later.retain(|key| {
-                let is_stale = !waits(key);
+    /// Moves the most urgent chunks of the backlog to `urgent`.
+    fn select_urgent(
+        &mut self,
+        view: Option<&View>,
+        members: &mut HashSet<ChunkKey>,
+        is_pending: impl Fn(&ChunkKey) -> bool,
+    ) {
+        if self.backlog.len() >= self.prune_at {
+            self.backlog.retain(|key| {
+                let is_stale = !is_pending(key);
                 if is_stale {
                     members.remove(key);
                 }
                 !is_stale
             });
-            self.prune_at = 2 * self.later.len() + FEW;
+            self.prune_at = 2 * self.backlog.len() + LEAST_TO_PRUNE;
         }
         let urgency = view.map(View::urgencies);
         let urgency = |key: ChunkKey| urgency.as_ref().map_or(0, |urgency| urgency(key.position));
-        self.soon.extend(self.later.drain(..).map(|key| (Reverse(urgency(key)), Reverse(key))));
+        self.urgent.extend(self.backlog.drain(..).map(|key| (Reverse(urgency(key)), Reverse(key))));
         self.is_sorted = false;
-        let most = self.soon.len().saturating_sub(SOON);
+        let most = self.urgent.len().saturating_sub(SORTED_AT_ONCE);
         if most > 0 {
-            let (_, (Reverse(bar), _), _) = self.soon.select_nth_unstable(most);
-            self.bar = *bar;
-            self.later.extend(self.soon.drain(..most).map(|(_, Reverse(key))| key));
+            let (_, (Reverse(threshold), _), _) = self.urgent.select_nth_unstable(most);
+            self.threshold = *threshold;
+            self.backlog.extend(self.urgent.drain(..most).map(|(_, Reverse(key))| key));
         } else {
-            self.bar = u32::MAX;
+            self.threshold = u32::MAX;
         }
     }
 }
@@ -255,13 +262,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn all_that_wait_come_once_and_by_urgency(
+        fn pending_chunks_are_popped_once_in_order_of_urgency(
             positions in prop::collection::vec(prop::array::uniform3(-9..9i32), 0..3_000),
             first in prop::array::uniform3(-9..9i32),
         ) {
             let cover = cover(&[(None, view(0.5))]);
             let mut queue = ChunkQueue::default();
-            let waits = |key: &ChunkKey| key.position[0] != 3;
+            let is_pending = |key: &ChunkKey| key.position[0] != 3;
             for (index, position) in positions.iter().enumerate() {
                 if index % 2 == 0 {
                     queue.add(ChunkKey::finest(*position), &cover);
@@ -275,14 +282,14 @@ mod tests {
             expected.retain(|(_, position)| position[0] != 3);
             queue.add_first(ChunkKey::finest(first));
             queue.add_first(ChunkKey::finest(first));
-            if waits(&ChunkKey::finest(first)) {
-                prop_assert_eq!(queue.pop(&cover, waits), Some(ChunkKey::finest(first)));
+            if is_pending(&ChunkKey::finest(first)) {
+                prop_assert_eq!(queue.pop(&cover, is_pending), Some(ChunkKey::finest(first)));
             }
-            // Chunks added in between find their place.
-            if let Some(key) = queue.pop(&cover, waits) {
+            // A chunk that is added between two pops is sorted in.
+            if let Some(key) = queue.pop(&cover, is_pending) {
                 queue.add(key, &cover);
             }
-            let found: Vec<_> = core::iter::from_fn(|| queue.pop(&cover, waits))
+            let found: Vec<_> = core::iter::from_fn(|| queue.pop(&cover, is_pending))
                 .map(|key| (cover.urgency(key.position), key.position))
                 .collect();
             prop_assert!(found.is_sorted());
@@ -291,7 +298,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_is_lost_when_viewers_go(
+        fn removing_a_viewer_keeps_its_chunks(
             positions in prop::collection::vec((prop::array::uniform3(-9..9i32), 0u32..3), 0..600),
         ) {
             let ids = [0, 1, 2].map(Entity::from_raw_u32);

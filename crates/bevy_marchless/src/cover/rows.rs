@@ -24,7 +24,7 @@ impl Rows {
     /// All rows: y, z, and the range of x.
     pub(super) fn iter(&self) -> impl Iterator<Item = (i32, i32, ops::Range<i32>)> + '_ {
         let [first_y, first_z] = self.from;
-        // Counted from 0: the last row may have the largest number that there is.
+        // Counted from 0, since the last row may have the highest `i32`.
         (0..).zip(self.spans.chunks(self.count.max(1))).flat_map(move |(z, spans)| {
             (0..).zip(spans).map(move |(y, &[start, end])| (first_y + y, first_z + z, start..end))
         })
@@ -103,8 +103,8 @@ impl Borders {
         }
     }
 
-    /// Reports the chunks that may be wanted more than with the `old` borders, and how much.
-    pub(super) fn come(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
+    /// Reports the chunks that may be wanted more than with the `old` borders, each with the residency wanted.
+    pub(super) fn report_entering(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
         self.drawn.difference(&old.drawn, None, &mut |position| take(position, Residency::Mesh));
         let mut take = |position| take(position, Residency::Samples);
         self.around.difference(&old.around, None, &mut take);
@@ -118,8 +118,8 @@ impl Borders {
         self.around.len().saturating_sub(others.around.len())
     }
 
-    /// Reports the chunks that may be wanted less than with the `old` borders, and how much at most.
-    pub(super) fn go(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
+    /// Reports the chunks that may be wanted less than with the `old` borders, each with the most residency wanted.
+    pub(super) fn report_leaving(&self, old: &Self, mut take: impl FnMut([i32; 3], Residency)) {
         let stays_around = Some(&self.stays_around);
         old.stays.difference(&self.stays, stays_around, &mut |position| take(position, Residency::Samples));
         let mut take = |position| take(position, Residency::Gone);

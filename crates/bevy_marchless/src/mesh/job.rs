@@ -119,27 +119,30 @@ fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {
 fn to_asset(geometry: &MeshBuffer, style: &AssetStyle, pooled: PooledAsset) -> Mesh {
     let MeshBuffer { positions, normals, materials, indices, bounds } = geometry;
     let indices = if positions.len() <= usize::from(u16::MAX) {
-        Indices::U16(filled(pooled.indices, indices.iter().map(|&index| index as u16)))
+        Indices::U16(fill_pooled(pooled.indices, indices.iter().map(|&index| index as u16)))
     } else {
         Indices::U32(indices.clone())
     };
     let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, style.usages)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, filled(pooled.positions, positions.iter().copied()))
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, fill_pooled(pooled.positions, positions.iter().copied()))
         .with_inserted_indices(indices);
     if !normals.is_empty() {
-        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, filled(pooled.normals, normals.iter().copied()));
+        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, fill_pooled(pooled.normals, normals.iter().copied()));
     }
     if !materials.is_empty() {
         let vertex_colors = materials.iter().map(|&material| style.colors[usize::from(material)]);
-        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, filled(pooled.colors, vertex_colors));
-        mesh.insert_attribute(ATTRIBUTE_MATERIAL, filled(pooled.materials, materials.iter().copied().map(u32::from)));
+        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, fill_pooled(pooled.colors, vertex_colors));
+        mesh.insert_attribute(
+            ATTRIBUTE_MATERIAL,
+            fill_pooled(pooled.materials, materials.iter().copied().map(u32::from)),
+        );
     }
     mesh.final_aabb = bounds.map(|[min, max]| Aabb3d::from_min_max(min, max));
     mesh
 }
 
 /// Fills an empty pooled vector with `items`.
-fn filled<T>(mut pooled: Vec<T>, items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
+fn fill_pooled<T>(mut pooled: Vec<T>, items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
     pooled.reserve_exact(items.len());
     pooled.extend(items);
     pooled

@@ -28,8 +28,8 @@ pub(super) fn take_filled_chunks(
         }
         volume.heart_mut().take_filled(MIN_CHUNKS, until, |chunk: &Filled| {
             stats.fill_time += chunk.time;
-            stats.filled += u64::from(chunk.filled);
-            stats.filled_empty += u64::from(chunk.filled && !chunk.may_have_surface());
+            stats.filled += u64::from(chunk.is_sampled);
+            stats.filled_empty += u64::from(chunk.is_sampled && !chunk.may_have_surface());
             if chunk.panicked {
                 let position = chunk.position;
                 bevy_log::error_once!("a terrain's source panicked; chunk {position:?} of terrain {terrain} stays air");
@@ -51,7 +51,7 @@ pub(super) fn ask_for_samples(
     let limit = settings.in_flight(threads);
     for mut volume in &mut volumes {
         if volume.heart().has_to_ask() {
-            let results = volume.heart().filled().clone();
+            let results = volume.heart().fill_results().clone();
             volume.heart_mut().ask_for_samples(limit, |job| {
                 let results = results.clone();
                 queue.push(Priority::Fill(job.urgency), move || results.push(job.run()))

@@ -56,7 +56,7 @@ pub(crate) fn prepare_terrains(
                     if before.voxel_size != terrain.voxel_size {
                         place_chunks(&terrain, volume.heart(), &mut transforms);
                     }
-                    volume.heart_mut().refill(terrain.recipe(), terrain.isovalue);
+                    volume.heart_mut().refill(terrain.sampling_settings(), terrain.isovalue);
                     follow_settings(&mut volume);
                 }
                 _ => start_over(&terrain, &mut volume, meshes.is_some(), &mut commands),
@@ -84,7 +84,8 @@ fn follow_settings(volume: &mut TerrainVolume) {
 /// Replaces the whole heart and despawns all chunks; chunks in the load regions are loaded anew.
 fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, meshing: bool, commands: &mut Commands) {
     let colors = Arc::new(terrain.palette.to_vertex_colors());
-    let former = volume.start_over(Heart::new(terrain.recipe(), terrain.isovalue, terrain.normals, colors, meshing));
+    let former =
+        volume.start_over(Heart::new(terrain.sampling_settings(), terrain.isovalue, terrain.normals, colors, meshing));
     despawn_chunks(former, commands);
 }
 

@@ -11,19 +11,20 @@ use super::groups::Pending;
 use crate::chunk::ChunkKey;
 use crate::stats::RequestTime;
 
-/// The changes that one update's stamps make to a terrain. Stamps whose chunks overlap form one region; each region is
-/// shown and reported by itself.
+/// The changes that one update's stamps make to a terrain. Stamps whose chunks overlap form one set; each set is shown
+/// and reported by itself.
 #[derive(Default)]
 pub(crate) struct Edits {
-    regions: Vec<Option<EditedRegion>>,
-    /// The region of each chunk that has changed samples, or lies beside one that has.
+    /// The sets by number; `None` for those that were merged into others.
+    sets: Vec<Option<EditedSet>>,
+    /// The set of each chunk that has changed samples, or lies beside one that has.
     owners: HashMap<[i32; 3], usize>,
     /// The chunks with changed samples, as they were before.
     before: BTreeMap<[i32; 3], GridChunk<i16>>,
 }
 
 /// The changes that some stamps made together.
-struct EditedRegion {
+struct EditedSet {
     edit: Edit,
     /// Chunks with changed samples.
     chunks: Vec<[i32; 3]>,
@@ -34,17 +35,17 @@ struct EditedRegion {
 
 impl Edits {
     /// Adds the changes of one stamp.
-    fn add(&mut self, mut new: EditedRegion) {
+    fn add(&mut self, mut new: EditedSet) {
         let mut overlapping: Vec<usize> =
             new.affected.iter().filter_map(|chunk| self.owners.get(chunk)).copied().collect();
         overlapping.sort_unstable();
         overlapping.dedup();
-        // The largest region takes the others in; the stamp's own chunks come last.
-        let size = |index: &usize| self.regions[*index].as_ref().map_or(0, |region| region.affected.len());
+        // The others merge into the largest set, and the stamp's own chunks come last.
+        let size = |index: &usize| self.sets[*index].as_ref().map_or(0, |set| set.affected.len());
         let home = overlapping.iter().copied().max_by_key(size);
-        let mut all = home.and_then(|home| self.regions[home].take());
-        let others = overlapping.into_iter().filter_map(|index| self.regions[index].take()).collect::<Vec<_>>();
-        let index = home.unwrap_or(self.regions.len());
+        let mut all = home.and_then(|home| self.sets[home].take());
+        let others = overlapping.into_iter().filter_map(|index| self.sets[index].take()).collect::<Vec<_>>();
+        let index = home.unwrap_or(self.sets.len());
         for other in others {
             self.owners.extend(other.affected.iter().map(|chunk| (*chunk, index)));
             match &mut all {
@@ -57,14 +58,14 @@ impl Edits {
             all.merge(new);
             new = all;
         }
-        match self.regions.get_mut(index) {
+        match self.sets.get_mut(index) {
             Some(place) => *place = Some(new),
-            None => self.regions.push(Some(new)),
+            None => self.sets.push(Some(new)),
         }
     }
 }
 
-impl EditedRegion {
+impl EditedSet {
     fn merge(&mut self, other: Self) {
         self.edit.merge(&other.edit);
         self.chunks.extend(other.chunks);
@@ -83,16 +84,16 @@ impl Heart {
         }
         if !changed.edit.is_empty() {
             let super::samples::StampChanges { edit, chunks, affected, .. } = changed;
-            edits.add(EditedRegion { edit, chunks, affected, since });
+            edits.add(EditedSet { edit, chunks, affected, since });
         }
     }
 
-    /// Records the changes of an update's stamps, and queues the chunks to be meshed. Returns the edit of each region.
+    /// Records the changes of an update's stamps, and queues the chunks to be meshed. Returns the edit of each set.
     pub(crate) fn finish_edits(&mut self, edits: Edits) -> Vec<Edit> {
-        let Edits { regions, before, .. } = edits;
+        let Edits { sets, before, .. } = edits;
         let settings = self.mesh_settings();
         let mut reports = Vec::new();
-        for EditedRegion { edit, chunks, affected, since } in regions.into_iter().flatten() {
+        for EditedSet { edit, chunks, affected, since } in sets.into_iter().flatten() {
             let before: BTreeMap<_, _> =
                 chunks.iter().filter_map(|chunk| Some((*chunk, before.get(chunk)?.clone()))).collect();
             let redrawn = self.samples.newest().chunks_with_mesh_changes(&before, edit.region, &settings);
@@ -162,33 +163,33 @@ mod tests {
     use super::*;
     use crate::stats::TerrainStats;
 
-    fn region(chunks: core::ops::Range<i32>, volume: u64) -> EditedRegion {
+    fn set(chunks: core::ops::Range<i32>, volume: u64) -> EditedSet {
         let affected: BTreeSet<_> = chunks.clone().map(|x| [x, 0, 0]).collect();
         let mut edit = Edit { region: Region::new([chunks.start, 0, 0], [chunks.end, 1, 1]), ..Edit::NONE };
         edit.removed.add(0, volume);
-        EditedRegion { edit, chunks: vec![[chunks.start, 0, 0]], affected, since: TerrainStats::default().now() }
+        EditedSet { edit, chunks: vec![[chunks.start, 0, 0]], affected, since: TerrainStats::default().now() }
     }
 
     #[test]
-    fn regions_that_overlap_become_one() {
+    fn overlapping_sets_merge() {
         let mut edits = Edits::default();
-        edits.add(region(0..3, 1));
-        edits.add(region(10..13, 2));
-        edits.add(region(20..23, 4));
-        edits.add(region(2..11, 8));
-        edits.add(region(30..31, 16));
-        edits.add(region(22..24, 32));
+        edits.add(set(0..3, 1));
+        edits.add(set(10..13, 2));
+        edits.add(set(20..23, 4));
+        edits.add(set(2..11, 8));
+        edits.add(set(30..31, 16));
+        edits.add(set(22..24, 32));
         let mut found: Vec<_> = edits
-            .regions
+            .sets
             .iter()
             .flatten()
-            .map(|region| (region.affected.len(), region.chunks.len(), region.edit.removed.total()))
+            .map(|set| (set.affected.len(), set.chunks.len(), set.edit.removed.total()))
             .collect();
         found.sort_unstable();
         assert_eq!(found, [(1, 1, 16), (4, 2, 36), (13, 3, 11)]);
-        edits.add(region(12..31, 64));
-        assert_eq!(edits.regions.iter().flatten().count(), 1);
+        edits.add(set(12..31, 64));
+        assert_eq!(edits.sets.iter().flatten().count(), 1);
         assert_eq!(edits.owners.len(), 31);
-        assert!(edits.owners.values().all(|owner| edits.regions[*owner].is_some()));
+        assert!(edits.owners.values().all(|owner| edits.sets[*owner].is_some()));
     }
 }

@@ -39,8 +39,8 @@ pub(crate) struct Filled {
     chunk: GridChunk<i16>,
     signs: KnownSigns,
     replayed: Replayed,
-    /// Whether the source was sampled, rather than its bound used.
-    pub(crate) filled: bool,
+    /// True if the source was sampled; false if its bound was enough.
+    pub(crate) is_sampled: bool,
     /// Whether the source panicked.
     pub(crate) panicked: bool,
     pub(crate) time: Duration,
@@ -66,11 +66,11 @@ impl FillJob {
             None => catch_unwind(AssertUnwindSafe(sample)),
         };
         let panicked = sampled.is_err();
-        let (chunk, filled) = sampled.unwrap_or((GridChunk::AIR, false));
+        let (chunk, is_sampled) = sampled.unwrap_or((GridChunk::AIR, false));
         let (chunk, replayed) = replay.run(chunk);
         let signs = if panicked { KnownSigns::UNKNOWN } else { KnownSigns::of(&chunk, isovalue) };
         let time = start.elapsed();
-        Filled { job, generation, position, chunk, signs, replayed, filled, panicked, time }
+        Filled { job, generation, position, chunk, signs, replayed, is_sampled, panicked, time }
     }
 }
 
@@ -83,12 +83,12 @@ impl Heart {
     /// Requests the samples of waiting chunks, the most urgent first, until `limit` jobs are under way. `start` starts
     /// a job.
     pub(crate) fn ask_for_samples(&mut self, limit: usize, mut start: impl FnMut(FillJob) -> Ticket) {
-        let Some(recipe) = self.recipe.clone() else { return };
+        let Some(settings) = self.sampling_settings.clone() else { return };
         while self.sampling < limit {
             let Self { to_fill, cover, table, .. } = self;
             let Some(key) = to_fill.pop(cover, |key| table.is_queued(*key)) else { break };
             let urgency = cover.urgency(key.position);
-            let job = self.fill_job(&recipe, key.position, urgency);
+            let job = self.fill_job(&settings, key.position, urgency);
             self.table.ask(key, job.job, start(job));
             self.sampling += 1;
         }
@@ -99,7 +99,7 @@ impl Heart {
             if is_coming || self.samples.is_resident(key.position) {
                 continue;
             }
-            let job = self.fill_job(&recipe, key.position, u32::MAX);
+            let job = self.fill_job(&settings, key.position, u32::MAX);
             self.remote.insert(key.position, (job.job, start(job)));
             self.sampling += 1;
         }
@@ -107,27 +107,27 @@ impl Heart {
 
     /// Takes results of sampling jobs while there is time, and at least `least` of them. Returns those that were taken.
     pub(crate) fn take_filled(&mut self, least: usize, until: Instant, mut note: impl FnMut(&Filled)) {
-        self.filled_later.extend(self.filled.take());
+        self.deferred_fills.extend(self.fill_results.take());
         let mut taken = 0;
         while (taken < least || Instant::now() < until)
-            && let Some(filled) = self.filled_later.pop_front()
+            && let Some(result) = self.deferred_fills.pop_front()
         {
             taken += 1;
-            if filled.generation == self.samples.generation() {
-                note(&filled);
-                self.samples_arrived(filled);
+            if result.generation == self.samples.generation() {
+                note(&result);
+                self.samples_arrived(result);
             }
         }
     }
 
     /// Whether results of sampling jobs wait to be taken.
     pub(crate) fn has_filled(&self) -> bool {
-        !self.filled_later.is_empty() || !self.filled.is_empty()
+        !self.deferred_fills.is_empty() || !self.fill_results.is_empty()
     }
 
     /// Takes the result of a job.
-    fn samples_arrived(&mut self, filled: Filled) {
-        let Filled { job, position, chunk, signs, replayed, .. } = filled;
+    fn samples_arrived(&mut self, result: Filled) {
+        let Filled { job, position, chunk, signs, replayed, .. } = result;
         let key = ChunkKey::finest(position);
         if self.table.is_asked(key, job) {
             self.sampling -= 1;
@@ -192,23 +192,23 @@ impl Heart {
         }
     }
 
-    fn fill_job(&self, recipe: &SamplingSettings, position: [i32; 3], urgency: u32) -> FillJob {
+    fn fill_job(&self, settings: &SamplingSettings, position: [i32; 3], urgency: u32) -> FillJob {
         FillJob {
             job: new_number(),
             generation: self.samples.generation(),
             position,
-            source: recipe.source.clone(),
-            cells: recipe.cells,
-            spacing: recipe.spacing,
+            source: settings.source.clone(),
+            cells: settings.cells,
+            spacing: settings.spacing,
             isovalue: self.isovalue,
-            replay: self.samples.replay(position, recipe.empty_grid()),
+            replay: self.samples.replay(position, settings.empty_grid()),
             urgency,
         }
     }
 
     /// The bound of a chunk by its source, without sampling.
     fn bound(&mut self, position: [i32; 3]) -> Option<GridChunk<i16>> {
-        let SamplingSettings { source, cells, spacing, .. } = self.recipe.as_ref()?;
+        let SamplingSettings { source, cells, spacing, .. } = self.sampling_settings.as_ref()?;
         if self.bounds.len() > MOST_BOXES {
             self.bounds.clear();
         }

@@ -11,25 +11,25 @@ use crate::chunk::ChunkKey;
 use crate::cover::{Residency, ViewId};
 use crate::stats::TerrainStats;
 
-/// The number of chunks that come, and that go, in each update at least.
+/// The least number of arriving chunks, and of leaving ones, that follow in each update.
 const MIN_CHUNKS: usize = 4;
-/// A view is revealed further while fewer of its chunks than this wait.
+/// A view is revealed further while fewer of its chunks than this are queued.
 const FEW: usize = 256;
 
 impl Heart {
-    /// Whether chunks wait to come or to go.
+    /// True if chunks have to follow the cover.
     pub(crate) fn has_to_follow(&self) -> bool {
         let is_idle = self.cover.is_revealed() && self.arriving.is_empty() && self.leaving.is_empty();
         !is_idle || !self.droppable.is_empty() || self.has_lost_leaves()
     }
 
-    /// Lets chunks go and come until the time is over, the most wanted first.
+    /// Lets leaving and arriving chunks follow the cover until the time is over; arriving ones in order of urgency.
     pub(crate) fn follow(&mut self, until: Instant, stats: &mut TerrainStats) {
-        if self.recipe.is_none() {
+        if self.sampling_settings.is_none() {
             return;
         }
         self.reveal(until);
-        // Each gets half of the time. But if as many chunks are leaving as viewers see, hardly any come.
+        // Both get half of the time. But while more chunks are leaving than viewers see, few arriving ones follow.
         let is_crowded = self.leaving.len() as f64 > self.cover.size();
         let share = if self.arriving.is_empty() || is_crowded { 1 } else { 2 };
         let now = Instant::now();
@@ -100,8 +100,8 @@ impl Heart {
     /// Changes the terrain's extent. Chunks inside both extents stay, with all edits; of those beyond, only the edits
     /// stay. Walls appear and disappear chunk by chunk, as soon as the chunks around them are there.
     pub(crate) fn resize(&mut self, extent: Region) {
-        let Some(recipe) = &mut self.recipe else { return };
-        let former = core::mem::replace(&mut recipe.extent, extent);
+        let Some(settings) = &mut self.sampling_settings else { return };
+        let former = core::mem::replace(&mut settings.extent, extent);
         self.samples.resize(extent);
         self.table.resize(extent);
         let is_inner = |key: &ChunkKey, region: Region| {
@@ -158,7 +158,7 @@ impl Heart {
 
     /// Gives a chunk the residency that the cover asks for.
     fn follow_residency(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
-        let Some(extent) = self.recipe.as_ref().map(|recipe| recipe.extent) else { return };
+        let Some(extent) = self.extent() else { return };
         let is_there = extent.contains(key.position);
         let wanted = if is_there { self.cover.wanted(key.position, self.table.kept(key)) } else { Residency::Gone };
         match (self.table.contains(key), wanted) {
@@ -185,9 +185,9 @@ impl Heart {
     /// Loads missing neighbours of a leaf that only the margin keeps: they went before the viewer came back. Nothing
     /// else would load them, and edits of the chunk would wait for them for ever.
     fn load_lost_neighbours(&mut self, key: ChunkKey, extent: Region, stats: &mut TerrainStats) {
-        // The missing neighbours of a chunk in range come anyway, once they have been reported.
-        let comes = self.cover.is_revealed() && self.cover.contains(key.position);
-        if comes || !self.table.lacks_samples(key) {
+        // The missing neighbours of a chunk in range are loaded anyway, once they have been reported.
+        let is_reported = self.cover.is_revealed() && self.cover.contains(key.position);
+        if is_reported || !self.table.lacks_samples(key) {
             return;
         }
         for near in key.around().filter(|near| extent.contains(near.position)) {
@@ -245,14 +245,14 @@ impl Heart {
 
     /// Whether samples can be made again, and nothing reads them at present.
     fn may_drop(&self, key: ChunkKey) -> bool {
-        let Some(recipe) = &self.recipe else { return false };
+        let Some(settings) = &self.sampling_settings else { return false };
         let is_done = |near: ChunkKey| {
             self.table.is_current(near) && !self.groups.is_claimed(near) && !self.groups.is_pending(near)
         };
         self.table.is_filled(key)
             && matches!(self.samples.newest().chunk(key.position), Some(GridChunk::Samples(_)))
             && !self.samples.touches_boundary(key.position)
-            && key.around().filter(|near| recipe.extent.contains(near.position)).all(is_done)
+            && key.around().filter(|near| settings.extent.contains(near.position)).all(is_done)
     }
 
     /// Notes that the samples of a chunk, and of those around it, may now be dropped.

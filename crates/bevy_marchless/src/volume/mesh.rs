@@ -53,7 +53,7 @@ impl Heart {
 
     /// Whether results of meshing jobs wait to be taken.
     pub(crate) fn has_meshed(&self) -> bool {
-        !self.meshed_later.is_empty() || !self.meshed.is_empty()
+        !self.deferred_meshes.is_empty() || !self.mesh_results.is_empty()
     }
 
     /// Sorts the drawable chunks that are out of date, until the time is over. Chunks without a surface need no job;
@@ -189,9 +189,9 @@ impl Heart {
         mut may_take_more: impl FnMut() -> bool,
         mut note: impl FnMut(&ChunkMesh),
     ) -> Option<Group> {
-        self.meshed_later.extend(self.meshed.take());
-        for _ in 0..self.meshed_later.len() {
-            match self.meshed_later.pop_front()? {
+        self.deferred_meshes.extend(self.mesh_results.take());
+        for _ in 0..self.deferred_meshes.len() {
+            match self.deferred_meshes.pop_front()? {
                 MeshResult::Restyled(restyled) => {
                     note(&restyled.meshed);
                     self.take_restyled(restyled);
@@ -199,7 +199,7 @@ impl Heart {
                 MeshResult::OfGroup(id, meshed) => {
                     let Some(group) = self.groups.get_mut(id) else { continue };
                     if group.gives_way() && !may_take_more() {
-                        self.meshed_later.push_back(MeshResult::OfGroup(id, meshed));
+                        self.deferred_meshes.push_back(MeshResult::OfGroup(id, meshed));
                         continue;
                     }
                     note(&meshed);

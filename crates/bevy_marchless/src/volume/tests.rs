@@ -72,12 +72,12 @@ struct Game {
     /// The stamps since the source began, and those that wait.
     stamps: Vec<QuantisedStamp>,
     waiting: Vec<QuantisedStamp>,
-    recipe: SamplingSettings,
+    settings: SamplingSettings,
     normals: bool,
     isovalue: f32,
 }
 
-fn recipe(shift: f64, extent: Region) -> SamplingSettings {
+fn sampling_settings(shift: f64, extent: Region) -> SamplingSettings {
     let hills = move |[x, y, z]: [f64; 3]| y - shift - 3.0 * (x * 0.2).sin() * (z * 0.15).cos();
     SamplingSettings { source: Arc::new(hills), extent, cells: CELLS, spacing: 1.0 }
 }
@@ -88,9 +88,9 @@ fn colors() -> Colors {
 
 impl Game {
     fn new() -> Self {
-        let recipe = recipe(0.0, WHOLE);
+        let settings = sampling_settings(0.0, WHOLE);
         Self {
-            heart: Heart::new(recipe.clone(), 0.0, true, colors(), true),
+            heart: Heart::new(settings.clone(), 0.0, true, colors(), true),
             queue: WorkQueue::default(),
             stats: TerrainStats::default(),
             screen: HashMap::new(),
@@ -99,7 +99,7 @@ impl Game {
             next_entity: 1,
             stamps: Vec::new(),
             waiting: Vec::new(),
-            recipe,
+            settings,
             normals: true,
             isovalue: 0.0,
         }
@@ -131,8 +131,8 @@ impl Game {
             }
             Event::Source { shift } => {
                 if self.heart.is_generation_shown() {
-                    self.recipe = recipe(shift, self.recipe.extent);
-                    self.heart.refill(self.recipe.clone(), self.isovalue);
+                    self.settings = sampling_settings(shift, self.settings.extent);
+                    self.heart.refill(self.settings.clone(), self.isovalue);
                     self.stamps.clear();
                     self.waiting.clear();
                 }
@@ -147,7 +147,7 @@ impl Game {
                 self.heart.set_isovalue(isovalue);
             }
             Event::Extent { index } => {
-                self.recipe.extent = EXTENTS[index];
+                self.settings.extent = EXTENTS[index];
                 self.heart.resize(EXTENTS[index]);
                 let mut viewers: Vec<u32> = self.views.keys().copied().collect();
                 viewers.sort_unstable();
@@ -159,7 +159,7 @@ impl Game {
 
     /// Tells the heart what a viewer sees.
     fn appearance(&mut self, viewer: u32) {
-        let extent = self.recipe.extent;
+        let extent = self.settings.extent;
         let view = self.views.get(&viewer).map(|&(middle, radius, margin, samples)| {
             let range = LoadRegion::ellipsoid(middle, [radius; 3], extent);
             let samples = samples.map(|samples| LoadRegion::ellipsoid(middle, [samples + 0.1; 3], extent));
@@ -177,7 +177,7 @@ impl Game {
             assert!(self.screen.remove(&entity).is_some(), "released twice, or never shown");
         }
         self.heart.take_filled(1, until, |_| {});
-        let results = self.heart.filled().clone();
+        let results = self.heart.fill_results().clone();
         self.heart.ask_for_samples(16, |job| {
             let results = results.clone();
             self.queue.push(Priority::Fill(job.urgency), move || results.push(job.run()))
@@ -198,7 +198,7 @@ impl Game {
             // What lies wholly beyond the extent is not kept.
             let [low, high] = [stamp.region().min, stamp.region().max.map(|v| v - 1)];
             let [low, high] = [low, high].map(|end| end.map(|v| v.div_euclid(CELLS as i32)));
-            let touched = Region::new(low, high.map(|v| v + 1)).intersection(&self.recipe.extent);
+            let touched = Region::new(low, high.map(|v| v + 1)).intersection(&self.settings.extent);
             self.stamps.extend((!touched.is_empty()).then_some(stamp));
             self.heart.stamp(stamp, self.stats.now(), &mut edits);
         }
@@ -226,7 +226,7 @@ impl Game {
             match restyle {
                 Restyle::Mesh(prepared) => self.start(prepared, Priority::Restyle),
                 Restyle::Recolor(key, group, geometry) => {
-                    let results = self.heart.meshed().clone();
+                    let results = self.heart.mesh_results().clone();
                     self.heart.start_recolor(group, |id| {
                         self.queue.push(Priority::Restyle, move || {
                             let meshed = ChunkMesh { geometry, ..ChunkMesh::empty(key.position) };
@@ -246,7 +246,7 @@ impl Game {
         }
         while let Some((key, job, settings)) = self.heart.next_in_transition(8) {
             let samples = self.heart.samples().neighbourhood(key.position).to_neighbourhood();
-            let (results, appearance) = (self.heart.meshed().clone(), self.heart.appearance());
+            let (results, appearance) = (self.heart.mesh_results().clone(), self.heart.appearance());
             let ticket = self.queue.push(Priority::Restyle, move || {
                 let meshed = meshed(&samples.view(), key.position, &settings);
                 results.push(MeshResult::Restyled(Restyled { job, meshed, appearance }));
@@ -269,7 +269,7 @@ impl Game {
         if prepared.to_mesh.is_empty() {
             return self.show_now(prepared);
         }
-        let (results, settings) = (self.heart.meshed().clone(), self.heart.mesh_settings());
+        let (results, settings) = (self.heart.mesh_results().clone(), self.heart.mesh_settings());
         self.heart.start(prepared, |heart, id, position| {
             let samples = heart.samples().neighbourhood(position).to_neighbourhood();
             let results = results.clone();
@@ -315,9 +315,12 @@ impl Game {
         }
         for position in WHOLE.points() {
             let key = ChunkKey::finest(position);
-            let (filled, resident) = (heart.table.is_filled(key), heart.samples.is_resident(position));
-            let may_be_resident = filled || heart.samples.touches_boundary(position);
-            assert!(resident == filled || resident && may_be_resident, "{position:?}: {filled}, {resident}");
+            let (is_filled, is_resident) = (heart.table.is_filled(key), heart.samples.is_resident(position));
+            let may_be_resident = is_filled || heart.samples.touches_boundary(position);
+            assert!(
+                is_resident == is_filled || is_resident && may_be_resident,
+                "{position:?}: {is_filled}, {is_resident}"
+            );
         }
         for queue in [heart.arriving.len(), heart.to_fill.len(), heart.to_mesh.len()] {
             assert!(queue <= 2 * WHOLE.points().count());
@@ -340,11 +343,11 @@ impl Game {
         assert_eq!(heart.coverage().waiting, 0);
         assert_eq!(heart.isovalue(), self.isovalue);
         assert!(heart.is_generation_shown() && heart.sampling == 0 && heart.groups.is_empty());
-        let extent = self.recipe.extent;
+        let extent = self.settings.extent;
         assert!(heart.table.keys().all(|key| extent.contains(key.position)), "what lies beyond has gone");
         let mut fresh = Grid::<i16>::bounded(CELLS, extent).expect("a good extent");
         for position in extent.points() {
-            let source = self.recipe.source.as_ref();
+            let source = self.settings.source.as_ref();
             fresh.insert_clean(position, GridChunk::from_source(source, position, CELLS, 1.0)).expect("a chunk of it");
             for stamp in &self.stamps {
                 fresh.apply_to_chunk(position, stamp, &mut SamplePool::new());

@@ -139,7 +139,7 @@ fn ball_text(radius: f64, more: &str) -> String {
 }
 
 #[test]
-fn a_world_is_loaded_and_followed() {
+fn a_terrain_file_is_loaded_and_followed() {
     let mut game = Game::new();
     let name = "followed.terrain.ron";
     game.write(name, ball_text(10.0, "voxel_size: 1.0"));
@@ -255,13 +255,13 @@ fn a_file_that_is_not_there_is_told_and_may_come_later() {
         app.world().get::<Terrain>(entity).unwrap().extent == UVec3::splat(2).into()
             && app.world().resource::<Assets<TerrainDescription>>().len() == 1
     });
-    assert_eq!(game.terrain(entity).chunk_cells, 16, "what a world does not say stays");
+    assert_eq!(game.terrain(entity).chunk_cells, 16, "settings that the file leaves out stay");
     assert_drawn(&mut game.app, entity);
     assert_eq!(warnings(name).len(), 1);
 }
 
 #[test]
-fn a_terrain_outlives_its_world() {
+fn a_terrain_outlives_its_file() {
     let mut game = Game::new();
     let name = "gone.terrain.ron";
     game.write(name, ball_text(12.0, ""));
@@ -283,40 +283,40 @@ fn a_terrain_outlives_its_world() {
 }
 
 #[test]
-fn worlds_can_be_changed_in_code() {
+fn descriptions_can_be_changed_in_code() {
     let mut game = Game::new();
-    let mut world = TerrainDescription::from_ron(&ball_text(12.0, "")).unwrap();
-    let handle = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>().add(world.clone());
+    let mut description = TerrainDescription::from_ron(&ball_text(12.0, "")).unwrap();
+    let handle = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>().add(description.clone());
     let entity = game.app.world_mut().spawn(TerrainFile(handle.clone())).id();
     game.drawn(entity);
     assert_drawn(&mut game.app, entity);
     let before = game.geometry(entity);
     assert!(before.iter().any(|(_, mesh)| !mesh.is_empty()));
 
-    let change = |game: &mut Game, world: &TerrainDescription| {
-        let mut worlds = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>();
-        *worlds.get_mut(&handle).unwrap() = world.clone();
-        drop(worlds);
+    let change = |game: &mut Game, description: &TerrainDescription| {
+        let mut descriptions = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>();
+        *descriptions.get_mut(&handle).unwrap() = description.clone();
+        drop(descriptions);
         game.drawn(entity);
     };
     warnings("code");
-    world.source = SourceDescription::Sdf(Sdf::sphere([30.0; 3], f64::NAN));
-    change(&mut game, &world);
-    world.source = SourceDescription::HeightMap(HeightMapDescription {
+    description.source = SourceDescription::Sdf(Sdf::sphere([30.0; 3], f64::NAN));
+    change(&mut game, &description);
+    description.source = SourceDescription::HeightMap(HeightMapDescription {
         picture: "code.png".into(),
         settings: HeightMapSettings::default(),
         map: None,
     });
-    change(&mut game, &world);
+    change(&mut game, &description);
     assert_eq!(warnings("code.png").len(), 1);
-    assert_eq!(game.geometry(entity), before, "a bad world changes nothing");
-    world.source = SourceDescription::Air;
-    change(&mut game, &world);
+    assert_eq!(game.geometry(entity), before, "a bad description changes nothing");
+    description.source = SourceDescription::Air;
+    change(&mut game, &description);
     assert!(game.geometry(entity).iter().all(|(_, mesh)| mesh.is_empty()));
 }
 
 #[test]
-fn a_height_map_is_read_with_its_world() {
+fn a_height_map_is_read_with_its_file() {
     let mut game = Game::new();
     let name = "map.terrain.ron";
     let text = "(source: HeightMap(picture: \"heights.png\", settings: (metres_per_unit: 0.001, floor: 20.0)),
@@ -381,10 +381,11 @@ fn the_name_alone_tells_that_a_file_describes_a_terrain() {
 
 #[test]
 fn stamps_wait_for_a_file_that_is_being_read() {
-    let world = TerrainDescription::new(SourceDescription::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
-    let world = TerrainDescription { extent: UVec3::splat(2).into(), ..world };
+    let description =
+        TerrainDescription::new(SourceDescription::Sdf(Sdf::cuboid([32.0, 0.0, 32.0], [99.0, 14.5, 99.0])));
+    let description = TerrainDescription { extent: UVec3::splat(2).into(), ..description };
     let mut game = Game::new();
-    game.write("a.terrain.ron", world.to_ron().unwrap());
+    game.write("a.terrain.ron", description.to_ron().unwrap());
     game.write("bad.terrain.ron", "(");
     let at = Vec3::new(20.0, 14.0, 20.0);
     let dig = |terrain| Stamp::dig(terrain, BrushShape::sphere(at, 5.0));

@@ -162,7 +162,7 @@ fn keep() -> impl Strategy<Value = Keep> {
     prop_oneof![Just(Keep::Nothing), extent().prop_map(Keep::Chunks), Just(Keep::Everything)]
 }
 
-fn world() -> impl Strategy<Value = TerrainDescription> {
+fn description() -> impl Strategy<Value = TerrainDescription> {
     let source = prop_oneof![
         Just(SourceDescription::Air),
         heights().prop_map(SourceDescription::NoiseHeights),
@@ -189,15 +189,15 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn what_is_written_is_read_again(world in world()) {
-        let text = world.to_ron().unwrap();
+    fn a_written_description_is_read_again(description in description()) {
+        let text = description.to_ron().unwrap();
         match TerrainDescription::from_ron(&text) {
             Ok(read) => {
-                prop_assert_eq!(&read, &world);
+                prop_assert_eq!(&read, &description);
                 prop_assert_eq!(read.to_ron().unwrap(), text);
             }
             // Values that are not valid settings are refused after they are read.
-            Err(DescriptionError::Source { .. } | DescriptionError::Terrain { .. }) => round_trip(&world),
+            Err(DescriptionError::Source { .. } | DescriptionError::Terrain { .. }) => round_trip(&description),
             Err(error) => panic!("{error} in {text}"),
         }
     }
@@ -247,16 +247,16 @@ fn what_is_left_out_has_its_default() {
 
 #[test]
 fn short_forms_are_read() {
-    let world = TerrainDescription::from_ron(
+    let description = TerrainDescription::from_ron(
         "(source: NoiseDensity(ground: (base: 40.0)), extent: (y: (-2, 6)), keep: Chunks(x: (0, 1), y: (0, 1), z: (0, 1)))",
     );
-    let world = world.unwrap();
-    let SourceDescription::NoiseDensity(NoiseDensitySettings { ground: Some(ground), .. }) = &world.source else {
-        panic!("{world:?}")
+    let description = description.unwrap();
+    let SourceDescription::NoiseDensity(NoiseDensitySettings { ground: Some(ground), .. }) = &description.source else {
+        panic!("{description:?}")
     };
     assert_eq!(ground.base, 40.0);
-    assert_eq!(world.extent, Extent::ENDLESS.with_y(-2..6));
-    assert_eq!(world.keep, Keep::Chunks(Extent::new(IVec3::ZERO, IVec3::ONE)));
+    assert_eq!(description.extent, Extent::ENDLESS.with_y(-2..6));
+    assert_eq!(description.keep, Keep::Chunks(Extent::new(IVec3::ZERO, IVec3::ONE)));
 }
 
 #[test]
@@ -345,7 +345,7 @@ fn a_file_that_is_cut_short_anywhere_says_so() {
 }
 
 #[test]
-fn a_world_nested_without_end_is_refused() {
+fn a_file_nested_without_end_is_refused() {
     let deep = format!("(source: Landscape(solid: {}))", "Union([".repeat(5_000));
     assert!(matches!(TerrainDescription::from_ron(&deep), Err(DescriptionError::Text { .. })));
     let mut shape = Sdf::sphere([0.0; 3], 1.0);
