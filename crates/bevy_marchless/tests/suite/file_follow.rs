@@ -296,7 +296,6 @@ fn descriptions_can_be_changed_in_code() {
     let change = |game: &mut Game, description: &TerrainDescription| {
         let mut descriptions = game.app.world_mut().resource_mut::<Assets<TerrainDescription>>();
         *descriptions.get_mut(&handle).unwrap() = description.clone();
-        drop(descriptions);
         game.drawn(entity);
     };
     warnings("code");

@@ -30,7 +30,6 @@ fn fractal() -> impl Strategy<Value = Fractal> {
             persistence,
             lacunarity,
             ridged,
-            ..Fractal::default()
         },
     )
 }
@@ -60,9 +59,8 @@ fn heights() -> impl Strategy<Value = NoiseHeightsSettings> {
 }
 
 fn density() -> impl Strategy<Value = NoiseDensitySettings> {
-    (fractal(), -1.0..1.0, prop::option::of(heights()), strata()).prop_map(|(noise, threshold, ground, strata)| {
-        NoiseDensitySettings { noise, threshold, ground, strata, ..NoiseDensitySettings::default() }
-    })
+    (fractal(), -1.0..1.0, prop::option::of(heights()), strata())
+        .prop_map(|(noise, threshold, ground, strata)| NoiseDensitySettings { noise, threshold, ground, strata })
 }
 
 fn point() -> impl Strategy<Value = DVec3> {
@@ -113,12 +111,10 @@ fn solid() -> impl Strategy<Value = Solid> {
         Just(Solid::Everything),
         layer().prop_map(Solid::Ground),
         sdf().prop_map(Solid::Shape),
-        (fractal(), -1.0..1.0, 1u32..16).prop_map(|(noise, threshold, lattice)| {
-            Solid::Caves(Caves { noise, threshold, lattice, ..Caves::default() })
-        }),
-        (fractal(), length(), 1u32..16).prop_map(|(noise, radius, lattice)| {
-            Solid::Tunnels(Tunnels { noise, radius, lattice, ..Tunnels::default() })
-        }),
+        (fractal(), -1.0..1.0, 1u32..16)
+            .prop_map(|(noise, threshold, lattice)| { Solid::Caves(Caves { noise, threshold, lattice }) }),
+        (fractal(), length(), 1u32..16)
+            .prop_map(|(noise, radius, lattice)| { Solid::Tunnels(Tunnels { noise, radius, lattice }) }),
     ];
     leaf.prop_recursive(3, 8, 3, |part| {
         let parts = || prop::collection::vec(part.clone(), 0..3);
@@ -138,14 +134,7 @@ fn landscape() -> impl Strategy<Value = LandscapeSettings> {
 
 fn height_map() -> impl Strategy<Value = HeightMapDescription> {
     let settings = (length(), length(), prop::option::of(number()), strata()).prop_map(|(x, y, floor, strata)| {
-        HeightMapSettings {
-            metres_per_pixel: DVec2::splat(x),
-            metres_per_unit: y,
-            exaggeration: y,
-            floor,
-            strata,
-            ..HeightMapSettings::default()
-        }
+        HeightMapSettings { metres_per_pixel: DVec2::splat(x), metres_per_unit: y, exaggeration: y, floor, strata }
     });
     (".*", settings).prop_map(|(picture, settings)| HeightMapDescription { picture, settings, map: None })
 }
