@@ -15,6 +15,8 @@
 //! (2010); the cases themselves go back to William E. Lorensen and Harvey E. Cline, "Marching Cubes: A High Resolution
 //! 3D Surface Construction Algorithm" (1987).
 
+pub mod transition;
+
 use crate::cell::{CaseIndex, Corner, Edge, Face};
 
 /// The number of triangles of each case, 0–5.

@@ -13,6 +13,8 @@ use marchless::{
     cell::{CaseIndex, Corner, Edge},
 };
 
+use crate::support::exact::{boundary, cross, dot, minus, triangles_cross};
+
 /// A directed line between the crossings of two edges.
 type Segment = [usize; 2];
 
@@ -35,18 +37,6 @@ fn corner_position(corner: usize) -> [i64; 3] {
 fn middle(edge: usize) -> [i64; 3] {
     let [a, b] = ends(edge).map(corner_position);
     [0, 1, 2].map(|axis| (a[axis] + b[axis]) / 2)
-}
-
-fn minus(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
-    [0, 1, 2].map(|axis| a[axis] - b[axis])
-}
-
-fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
-    [0, 1, 2].map(|axis| a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3])
-}
-
-fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
-    (0..3).map(|axis| a[axis] * b[axis]).sum()
 }
 
 /// The six faces, each with its axis, whether it is the high one, and its four corners.
@@ -101,20 +91,6 @@ fn segments(case: usize) -> Vec<Segment> {
 fn triangles(case: usize) -> Vec<[usize; 3]> {
     let count = usize::from(TRIANGLE_COUNTS[case]);
     TRIANGLES[case][..count].iter().map(|triangle| triangle.map(Edge::index)).collect()
-}
-
-/// For each directed side, how often it occurs minus how often its reverse does. Sides that cancel are left out.
-fn boundary(triangles: &[[usize; 3]]) -> BTreeMap<Segment, i32> {
-    let mut sides = BTreeMap::new();
-    for triangle in triangles {
-        for corner in 0..3 {
-            let (a, b) = (triangle[corner], triangle[(corner + 1) % 3]);
-            *sides.entry([a, b]).or_insert(0) += 1;
-            *sides.entry([b, a]).or_insert(0) -= 1;
-        }
-    }
-    sides.retain(|_, count| *count > 0);
-    sides
 }
 
 #[test]
@@ -237,28 +213,6 @@ fn place(edge: usize, step: i64) -> [i64; 3] {
     position
 }
 
-/// True if the interiors of two triangles have a point in common.
-///
-/// They have none if an axis separates them. For two triangles it is enough to try the normals, the cross products of a
-/// side of each, and the directions in a triangle's plane across its sides.
-fn triangles_cross(a: [[i64; 3]; 3], b: [[i64; 3]; 3]) -> bool {
-    let sides = |t: [[i64; 3]; 3]| [0, 1, 2].map(|corner| minus(t[(corner + 1) % 3], t[corner]));
-    let (sides_a, sides_b) = (sides(a), sides(b));
-    let normals = [sides_a, sides_b].map(|sides| cross(sides[0], sides[1]));
-    let separates = |axis: [i64; 3]| {
-        let [(min_a, max_a), (min_b, max_b)] = [a, b].map(|triangle| {
-            let along = triangle.map(|corner| dot(corner, axis));
-            (along.into_iter().min().unwrap_or(0), along.into_iter().max().unwrap_or(0))
-        });
-        // They may touch (at a shared corner or side), but not both lie in the plane between them.
-        (max_a <= min_b && min_a < max_b) || (max_b <= min_a && min_b < max_a)
-    };
-    let products = sides_a.into_iter().flat_map(|side_a| sides_b.map(|side_b| cross(side_a, side_b)));
-    let in_plane =
-        sides_a.map(|side| cross(side, normals[0])).into_iter().chain(sides_b.map(|side| cross(side, normals[1])));
-    !normals.into_iter().chain(products).chain(in_plane).any(separates)
-}
-
 fn assert_nothing_crosses(case: usize, triangles: &[[usize; 3]], steps: &[i64; 12]) {
     let placed: Vec<_> = triangles.iter().map(|triangle| triangle.map(|edge| place(edge, steps[edge]))).collect();
     for (index, &a) in placed.iter().enumerate() {
@@ -266,18 +220,6 @@ fn assert_nothing_crosses(case: usize, triangles: &[[usize; 3]], steps: &[i64; 1
             assert!(!triangles_cross(a, b), "case {case:08b}: {a:?} and {b:?} cross");
         }
     }
-}
-
-#[test]
-fn crossing_triangles_are_noticed() {
-    let floor = [[0, 0, 0], [4, 0, 0], [0, 4, 0]];
-    let standing = |x: i64| [[x, 1, -1], [x, 1, 3], [x + 9, 9, 3]];
-    assert!(triangles_cross(floor, standing(1)));
-    assert!(!triangles_cross(floor, standing(5)));
-    // A shared corner or side is no crossing; an overlap in one plane is one.
-    assert!(!triangles_cross(floor, [[0, 0, 0], [-4, 0, 1], [0, -4, 1]]));
-    assert!(!triangles_cross(floor, [[4, 0, 0], [0, 4, 0], [4, 4, 0]]));
-    assert!(triangles_cross(floor, [[4, 0, 0], [0, 4, 0], [1, 1, 0]]));
 }
 
 #[test]

@@ -19,3 +19,4 @@ mod seams;
 mod support;
 mod surface;
 mod topology;
+mod transition_cells;

@@ -1,5 +1,6 @@
 //! Helpers that several test modules share.
 
+pub(crate) mod exact;
 mod fields;
 mod random;
 
