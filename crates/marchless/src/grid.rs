@@ -21,6 +21,7 @@ pub use self::error::GridError;
 use self::occupancy::Occupancy;
 pub use self::pool::SamplePool;
 use crate::buffer::MeshBuffer;
+pub use crate::lattice::MAX_CHUNK_CELLS;
 use crate::lattice::Region;
 use crate::mesher::{MeshError, MeshSettings, Mesher};
 use crate::sample::{Voxel, Weight};
@@ -30,8 +31,6 @@ use crate::source::Source;
 pub const DEFAULT_CHUNK_CELLS: u32 = 32;
 /// The smallest number of cells per axis of a chunk.
 pub const MIN_CHUNK_CELLS: u32 = 8;
-/// The largest number of cells per axis of a chunk.
-pub const MAX_CHUNK_CELLS: u32 = 62;
 
 /// The most chunk positions that are all marked dirty, absent chunks included. In larger regions, only present chunks
 /// and their neighbours are marked.

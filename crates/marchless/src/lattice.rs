@@ -4,6 +4,9 @@ use core::fmt;
 
 use thiserror::Error;
 
+/// The largest number of cells per axis of a chunk.
+pub const MAX_CHUNK_CELLS: u32 = 62;
+
 /// The size of a lattice in samples per axis, x fastest: the sample at `[x, y, z]` has index `x + nx·(y + ny·z)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shape([u32; 3]);

@@ -13,6 +13,8 @@
 //! | cell | the cube between 8 samples; the module [`cell`] defines its corners, edges, faces and case index |
 //! | chunk | the unit that is meshed: 32 cells per axis by default |
 //! | block | the samples that one chunk's mesh is made from: the chunk's own, and padding |
+//! | level | a level of detail: 0 is the finest, and each further one has cells twice as wide |
+//! | leaf | a chunk of an octree of chunks of several levels |
 //! | stamp, edit | a stamp is one application of a brush; an edit is the change that it made |
 //!
 //! # From samples to a mesh
@@ -37,10 +39,16 @@
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 //!
+//! # Levels of detail
+//! [`Mesher::mesh_leaf`] meshes a chunk beside neighbours that are one level finer. The seam is part of its mesh, so that
+//! nothing special is needed to draw it. [`MeshUnion`] judges the meshes of many chunks as one surface.
+//!
 //! # Guaranteed
 //! - Within a chunk and across chunks, the surface is closed, 2-manifold, consistently oriented and free of zero-area
 //!   triangles, and every vertex and normal is finite. This holds in both [`Topology`]s and on every input: ties with
 //!   the isovalue, NaN, infinities and subnormal numbers included. Vertices on a shared border are equal bit for bit.
+//! - The same holds across levels of detail, as [`Mesher::mesh_leaf`] says in detail; only that triangles do not cross
+//!   is not promised there.
 //! - With [`Topology::Separated`], the default, no two triangles cross, and the surface is that of digital topology:
 //!   inside points are neighbours along the axes only, outside points also along the diagonals of faces.
 //! - With [`Topology::Trilinear`], the surface has the topology of the trilinear interpolant in every cell, to the
@@ -125,9 +133,9 @@ pub use grid::{
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
-pub use mesher::{MeshError, MeshSettings, Mesher, SlabMesher, Topology};
+pub use mesher::{FinerNeighbours, LeafError, LeafSamples, MeshError, MeshSettings, Mesher, SlabMesher, Topology};
 pub use query::RayHit;
 pub use sample::{Voxel, Weight};
 pub use simd::Backend;
 pub use source::{Bound, Source, SourceRegion};
-pub use validate::{ExtractionReport, MeshReport};
+pub use validate::{ExtractionReport, MeshReport, MeshUnion};

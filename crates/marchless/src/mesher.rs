@@ -20,6 +20,7 @@
 mod crossing;
 mod error;
 mod job;
+mod normal;
 mod output;
 mod pipeline;
 mod primal;
@@ -27,6 +28,7 @@ mod settings;
 mod stream;
 #[cfg(feature = "std")]
 mod threads;
+mod transition;
 mod trilinear;
 
 use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
@@ -39,6 +41,8 @@ pub use settings::{MeshSettings, Topology};
 pub use stream::SlabMesher;
 #[cfg(feature = "std")]
 pub use threads::ThreadedMesher;
+use transition::Transitions;
+pub use transition::{FinerNeighbours, LeafError, LeafSamples};
 
 /// Turns samples into meshes. It keeps its scratch memory from mesh to mesh.
 ///
@@ -74,17 +78,18 @@ pub struct Mesher {
     /// `None` until the first mesh.
     backend: Option<Backend>,
     pipeline: SlabPipeline,
+    transitions: Transitions,
 }
 
 impl Mesher {
     /// A mesher that uses the [fastest](Backend::fastest) backend. It allocates nothing until the first mesh.
     pub const fn new() -> Self {
-        Self { backend: None, pipeline: SlabPipeline::new() }
+        Self { backend: None, pipeline: SlabPipeline::new(), transitions: Transitions::new() }
     }
 
     /// A mesher that uses `backend`, or the portable one if that is not [available](Backend::is_available).
     pub const fn with_backend(backend: Backend) -> Self {
-        Self { backend: Some(backend), pipeline: SlabPipeline::new() }
+        Self { backend: Some(backend), pipeline: SlabPipeline::new(), transitions: Transitions::new() }
     }
 
     /// Meshes `samples` into `out` and drops its former content. Samples without a surface are no error: `out` is then

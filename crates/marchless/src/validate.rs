@@ -1,4 +1,5 @@
-//! [`MeshReport`] and [`ExtractionReport`]: the defects of an indexed triangle mesh from any source.
+//! [`MeshReport`] and [`ExtractionReport`]: the defects of an indexed triangle mesh from any source; [`MeshUnion`]:
+//! several meshes, to be judged as one.
 //!
 //! ```text
 //! positions ──coincident──▶ vertices with equal positions
@@ -19,6 +20,7 @@ mod links;
 mod order;
 mod predicates;
 mod triangle;
+mod union;
 mod work;
 
 use alloc::borrow::Cow;
@@ -27,6 +29,7 @@ use core::{fmt, ops::ControlFlow};
 use coincident::Coincident;
 pub use extraction::ExtractionReport;
 use links::Links;
+pub use union::MeshUnion;
 use work::Work;
 
 /// Counts the defects of an indexed triangle mesh, and says what kind of surface it is.

@@ -47,6 +47,9 @@ pub enum MeshError {
         /// The number of slabs that were pushed.
         found: usize,
     },
+    /// A leaf with finer neighbours is meshed with another topology than [`Topology::Separated`](crate::Topology).
+    #[error("a leaf with finer neighbours can be meshed with Topology::Separated only")]
+    LeafTopology,
     /// `u32` indices cannot number all vertices.
     #[error("the surface has at least {found} vertices, more than 32-bit indices can name")]
     TooManyVertices {

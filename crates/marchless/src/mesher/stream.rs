@@ -163,7 +163,7 @@ mod tests {
 
         let weights = [1i8, 1, 1, 1, -1, -1, -1, -1];
         let samples = Samples::new(Shape::cube(2).unwrap(), &weights).unwrap();
-        let mut next = Mesher { backend: None, pipeline: mesher.pipeline };
+        let mut next = Mesher { pipeline: mesher.pipeline, ..Mesher::new() };
         next.mesh(samples, &MeshSettings::default(), &mut mesh).unwrap();
         assert_eq!(mesh.triangle_count(), 2);
     }

@@ -14,6 +14,7 @@ mod chunks;
 mod crossings;
 mod exhaustive;
 mod extraction;
+mod levels;
 mod oracle;
 mod seams;
 mod support;
