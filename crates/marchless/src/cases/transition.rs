@@ -26,19 +26,19 @@
 //! lines from a corner to itself on the coarser face carry no crossing.
 //!
 //! The faces follow the rule of the [regular cells](super): **inside corners are separated**. So a transition cell fits
-//! the four cells at its finer face, the cell at its coarser face, and its neighbours at the lateral faces. The segments
-//! close into at most 4 loops of 3 to 11 crossings. They become triangles as follows:
+//! the four cells at its finer face, the cell at its coarser face, and its neighbours at the lateral faces. The
+//! segments close into at most 4 loops of 3 to 11 crossings. They become triangles as follows:
 //!
 //! - A loop that reaches the coarser face becomes a fan around one of its crossings there. No triangle then has three
 //!   corners on the finer face, where they could lie on one line: on flat ground they do.
-//! - A loop that passes the coarser face twice leaves two crossings out of that fan, because diagonals to them would lie
-//!   in the coarser face. They form a quadrilateral with their neighbours on the loop.
+//! - A loop that passes the coarser face twice leaves two crossings out of that fan, because diagonals to them would
+//!   lie in the coarser face. They form a quadrilateral with their neighbours on the loop.
 //! - A *flat* loop never leaves the finer face. It becomes the first fan that has no diagonal in one of the nine faces
 //!   and whose triangles turn the same way, wherever on their edges the crossings lie.
 //! - *Pinched* squares of the finer face are cut off first, as a quadrilateral each. There, a flat loop touches itself
-//!   or another one between two outside samples; 13 cases have such squares. Without the cut, no fan would do, and where
-//!   all four squares are pinched (case 341, the checkerboard), the discs of two loops would cover each other. With it,
-//!   that case is a ring of 12 triangles.
+//!   or another one between two outside samples; 13 cases have such squares. Without the cut, no fan would do, and
+//!   where all four squares are pinched (case 341, the checkerboard), the discs of two loops would cover each other.
+//!   With it, that case is a ring of 12 triangles.
 //!
 //! The tests show that triangles never cross and have an area, wherever on their edges the crossings lie, for cells an
 //! eighth as thick as they are wide, and for coarser faces whose sides are moved by as much. A diagonal lies in a face
@@ -48,7 +48,7 @@
 //! Refused: the first fan or the shortest diagonals for all loops. Dozens of cases have triangles that cross.
 //!
 //! Transition cells are those of Eric Lengyel, "Voxel-Based Terrain for Real-Time Virtual Simulations" (2010),
-//! chapter 4. His numbering of samples and edges is another.
+//! chapter 4. He numbers cases differently: bits go around the finer face, the centre last.
 
 /// An edge of a transition cell, 0–15: twelve on the finer face, four on the coarser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -142,11 +142,20 @@ const FACES: [&[usize]; 9] = [
 /// The number of squares of the finer face: the first entries of [`FACES`].
 const SQUARES: usize = 4;
 
-/// The edge of face `face` behind its sample number `start`.
-const fn face_edge(face: usize, start: usize) -> TransitionEdge {
-    let samples = FACES[face];
-    TransitionEdge::between(samples[start % samples.len()], samples[(start + 1) % samples.len()])
-}
+/// The edges of each face: entry `i` joins samples `i` and `i + 1` of its list. The last entry of a lateral face is
+/// unused.
+const FACE_EDGES: [[TransitionEdge; 4]; 9] = {
+    let (mut edges, mut face) = ([[TransitionEdge(0); 4]; 9], 0);
+    while face < FACES.len() {
+        let (samples, mut start) = (FACES[face], 0);
+        while start < samples.len() {
+            edges[face][start] = TransitionEdge::between(samples[start], samples[(start + 1) % samples.len()]);
+            start += 1;
+        }
+        face += 1;
+    }
+    edges
+};
 
 /// The two faces that each edge lies on, a bit each.
 const EDGE_FACES: [u16; 16] = {
@@ -154,7 +163,7 @@ const EDGE_FACES: [u16; 16] = {
     while face < FACES.len() {
         let mut start = 0;
         while start < FACES[face].len() {
-            faces[face_edge(face, start).index()] |= 1 << face;
+            faces[FACE_EDGES[face][start].index()] |= 1 << face;
             start += 1;
         }
         face += 1;
@@ -203,11 +212,14 @@ impl TransitionCase {
     /// The pinched squares of the finer face, a bit each: the centre is inside, and only flat loops pass the square's
     /// four edges.
     const fn pinched(self) -> u8 {
+        if !self.is_inside(4) {
+            return 0;
+        }
         let (next, mut pinched, mut square) = (next_crossings(self, 0), 0, 0);
         while square < SQUARES {
-            let (mut all_flat, mut start) = (self.is_inside(4), 0);
+            let (mut all_flat, mut start) = (true, 0);
             while start < 4 && all_flat {
-                let edge = face_edge(square, start);
+                let edge = FACE_EDGES[square][start];
                 all_flat = self.crosses(edge) && Loop::new(&next, edge).is_flat();
                 start += 1;
             }
@@ -248,8 +260,7 @@ impl Cases {
         let (pinched, mut square) = (case.pinched(), 0);
         while square < SQUARES {
             if pinched >> square & 1 == 1 {
-                let [a, b, c, d] =
-                    [face_edge(square, 0), face_edge(square, 1), face_edge(square, 2), face_edge(square, 3)];
+                let [a, b, c, d] = FACE_EDGES[square];
                 self.push([a, b, c]);
                 self.push([a, c, d]);
             }
@@ -314,7 +325,7 @@ const fn next_crossings(case: TransitionCase, pinched: u8) -> [Option<Transition
                 while case.is_inside(samples[(end + 1) % len]) {
                     end += 1;
                 }
-                next[face_edge(face, start).index()] = Some(face_edge(face, end));
+                next[FACE_EDGES[face][start].index()] = Some(FACE_EDGES[face][end % len]);
             }
             start += 1;
         }
