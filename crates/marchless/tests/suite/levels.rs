@@ -3,10 +3,13 @@
 use std::collections::HashMap;
 
 use fastrand::Rng;
-use marchless::{LeafError, MeshBuffer, MeshReport, MeshSettings, MeshUnion, Mesher, Topology};
+use marchless::{
+    LeafError, LeafKey, LevelCover, LevelSettings, MeshBuffer, MeshReport, MeshSettings, MeshUnion, Mesher, Region,
+    Topology,
+};
 
 use crate::support::TestWeight;
-use cover::Cover;
+use cover::{Cover, Leaf};
 use field::Field;
 
 mod cover;
@@ -15,10 +18,20 @@ mod refusals;
 
 /// Meshes all leaves of a cover and checks their union.
 fn check<W: TestWeight>(cover: &Cover, field: &Field<W>, mesher: &mut Mesher) -> MeshReport {
+    check_leaves(cover, cover.leaves(), field, mesher)
+}
+
+/// Meshes leaves of a cover, all that have a surface, and checks their union.
+fn check_leaves<W: TestWeight>(
+    cover: &Cover,
+    leaves: impl Iterator<Item = Leaf>,
+    field: &Field<W>,
+    mesher: &mut Mesher,
+) -> MeshReport {
     let settings = MeshSettings { isovalue: field.isovalue, ..MeshSettings::default() };
     let (mut mesh, mut union) = (MeshBuffer::new(), MeshUnion::new());
     let mut vertices: HashMap<[u64; 3], ([u32; 3], u8)> = HashMap::new();
-    for leaf in cover.leaves() {
+    for leaf in leaves {
         let block = field.block(cover, leaf);
         let samples = block.leaf().unwrap_or_else(|error| panic!("{error} in {cover:?}, {field:?}"));
         mesher.mesh_leaf(&samples, &settings, &mut mesh).expect("the settings are sound");
@@ -102,6 +115,40 @@ fn random_octrees_are_closed() {
         let cover = Cover::random_octree(&mut random, 3, cells);
         check(&cover, &Field::<i16>::random(&mut random), &mut mesher);
         check(&cover, &Field::<f32>::random(&mut random), &mut mesher);
+    }
+}
+
+/// Covers of viewers over rolling ground, of which only the leaves that may have a surface are meshed.
+#[test]
+fn covers_of_viewers_are_closed() {
+    let (mut mesher, mut random) = (Mesher::new(), Rng::with_seed(4));
+    let (cells, size, field) = (4, [16, 16, 16], Field::<i16>::hills());
+    let extent = Region::new([0; 3], size);
+    for _ in 0..12 {
+        let viewers: Vec<[f64; 3]> = (0..random.usize(1..4))
+            .map(|_| [16.0 * random.f64(), 6.0 + 4.0 * random.f64(), 16.0 * random.f64()])
+            .collect();
+        let settings = LevelSettings { levels: 4, falloff: 1.75, view_distance: 40.0, extent, ..Default::default() };
+        let levels = LevelCover::new(&viewers, &settings, None, |leaf| {
+            let Region { min, max } = leaf.region();
+            // The extent's border has walls where it cuts the ground.
+            let is_inner = (0..3).all(|axis| min[axis] > 0 && max[axis] < size[axis]);
+            field.is_empty(min.map(|v| v * cells), max.map(|v| v * cells), is_inner)
+        });
+        let levels = levels.expect("the settings are sound");
+        let cover = Cover::of_levels(&levels, size, cells);
+        let drawn: Vec<Leaf> = cover
+            .leaves()
+            .filter(|leaf| {
+                levels.leaves().any(|(key, empty)| !empty && key.region().min.map(|v| v * cells) == leaf.min)
+            })
+            .collect();
+        assert!(drawn.len() > 30 && drawn.len() < cover.leaves().count());
+        for leaf in &drawn {
+            let key = LeafKey { level: leaf.level, position: leaf.min.map(|v| (v / cells) >> leaf.level) };
+            assert_eq!(levels.finer_neighbours(key), field.block(&cover, *leaf).finer);
+        }
+        check_leaves(&cover, drawn.into_iter(), &field, &mut mesher);
     }
 }
 

@@ -49,7 +49,7 @@ impl FinerNeighbours {
 
     /// The direction across the first edge of the leaf at which finer and coarser leaves alternate, if there is one:
     /// those across both faces at the edge are finer, and the one across the edge is not.
-    pub(super) fn alternating_edge(self) -> Option<[i32; 3]> {
+    pub(crate) fn alternating_edge(self) -> Option<[i32; 3]> {
         (0..27).map(direction).find(|&[x, y, z]| {
             let faces = [[x, 0, 0], [0, y, 0], [0, 0, z]].map(|face| self.contains(face));
             let is_edge = [x, y, z].iter().filter(|v| **v != 0).count() == 2;

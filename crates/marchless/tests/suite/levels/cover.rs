@@ -3,6 +3,7 @@
 use std::fmt;
 
 use fastrand::Rng;
+use marchless::LevelCover;
 
 /// A chunk of a cover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,17 @@ impl Cover {
                 Leaf { min: chunk.map(|v| (v >> level << level) * cells), level }
             })
             .collect();
+        cover
+    }
+
+    /// The leaves of a cover of a whole extent that begins at the origin. `size`: chunks of level 0 per axis.
+    pub(super) fn of_levels(levels: &LevelCover, size: [i32; 3], cells: i32) -> Self {
+        let mut cover = Self { cells, size, leaves: Vec::new() };
+        let leaf = |chunk| {
+            let key = levels.leaf_at(chunk).expect("the whole extent is in view");
+            Leaf { min: key.region().min.map(|v| v * cells), level: key.level }
+        };
+        cover.leaves = cover.chunks().map(leaf).collect();
         cover
     }
 

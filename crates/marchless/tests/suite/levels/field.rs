@@ -20,6 +20,8 @@ enum Kind<W> {
     Noise(Vec<W>),
     /// A plane, whose offset differs a little from level to level.
     Plane { slope: [f32; 3], offset: f32, jump: f32 },
+    /// Rolling ground, which differs from level to level by up to half a voxel.
+    Hills,
 }
 
 impl<W: TestWeight> Field<W> {
@@ -47,6 +49,20 @@ impl<W: TestWeight> Field<W> {
         matches!(self.kind, Kind::Plane { .. })
     }
 
+    pub(super) const fn hills() -> Self {
+        Self { kind: Kind::Hills, seed: 0, isovalue: 0.0 }
+    }
+
+    /// Whether all samples of a box of voxels, borders included, are outside, or all inside if that may be, at all
+    /// levels.
+    pub(super) fn is_empty(&self, min: [i32; 3], max: [i32; 3], may_be_inside: bool) -> bool {
+        let mut columns = (min[2]..=max[2]).flat_map(|z| (min[0]..=max[0]).map(move |x| [x, z]));
+        let is_within =
+            |[x, z]: [i32; 2], y: i32, from: f32, to: f32| (from..to).contains(&self.at([x, y, z], 0).0.to_voxels());
+        columns.clone().all(|column| is_within(column, min[1], 3.0, f32::MAX))
+            || may_be_inside && columns.all(|column| is_within(column, max[1], f32::MIN, -3.0))
+    }
+
     /// Level ground at this height.
     pub(super) fn ground(height: f32) -> Self {
         let kind = Kind::Plane { slope: [0.0, 0.0, 1.0], offset: -height, jump: 0.0 };
@@ -66,6 +82,11 @@ impl<W: TestWeight> Field<W> {
             Kind::Plane { slope, offset, jump } => {
                 let distance = (0..3).map(|axis| slope[axis] * point[axis] as f32).sum::<f32>() + offset;
                 W::from_voxels(distance + jump * f32::from(level))
+            }
+            Kind::Hills => {
+                let [x, y, z] = point.map(|v| v as f32);
+                let ground = 24.0 + 9.0 * (x / 11.0).sin() + 6.0 * (z / 8.0).cos() + 2.0 * ((x + z) / 3.0).sin();
+                W::from_voxels(y - ground + random.f32() * f32::from(level.min(1)) / 2.0)
             }
         };
         (weight, material)

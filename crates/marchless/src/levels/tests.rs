@@ -1,0 +1,185 @@
+use alloc::{collections::BTreeSet, string::ToString, vec::Vec};
+
+use proptest::prelude::*;
+
+use super::*;
+
+const EXTENT: Region = Region::new([-40, -24, -33], [48, 17, 40]);
+
+/// Rolling ground: chunks well above and below it are empty.
+fn is_empty(key: LeafKey) -> bool {
+    let Region { min, max } = key.region();
+    let middle = [0, 2].map(|axis| f64::from(min[axis] + max[axis]) / 2.0);
+    let ground = 6.0 * libm::sin(middle[0] / 9.0) + 5.0 * libm::cos(middle[1] / 7.0);
+    let slack = 1.0 + f64::from(max[0] - min[0]);
+    f64::from(min[1]) > ground + slack || f64::from(max[1]) < ground - slack
+}
+
+fn settings(levels: u8, falloff: f64, view_distance: f64) -> LevelSettings {
+    LevelSettings { levels, falloff, view_distance, extent: EXTENT, ..LevelSettings::default() }
+}
+
+/// Whether the boxes of two leaves have a face, an edge or a corner in common.
+fn touch(a: LeafKey, b: LeafKey) -> bool {
+    let [a, b] = [a.region(), b.region()];
+    (0..3).all(|axis| a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis])
+}
+
+/// Checks everything that a cover promises.
+fn check(cover: &LevelCover, viewers: &[[f64; 3]], settings: &LevelSettings) -> Result<(), TestCaseError> {
+    let leaves: Vec<(LeafKey, bool)> = cover.leaves().collect();
+    let existing = |leaf: LeafKey| leaf.region().intersection(&EXTENT);
+    let mut covered = 0u64;
+    for &(leaf, empty) in &leaves {
+        prop_assert_eq!(empty, is_empty(leaf), "{:?}", leaf);
+        let region = existing(leaf);
+        prop_assert!(!region.is_empty(), "{:?} is outside", leaf);
+        covered += region.size().map(u64::from).iter().product::<u64>();
+        for corner in [region.min, region.max.map(|v| v - 1)] {
+            prop_assert_eq!(cover.leaf_at(corner), Some(leaf));
+        }
+        prop_assert!(!cover.is_split(leaf));
+    }
+    // Leaves do not overlap: they have as many chunks as the chunks in view.
+    let roots = cover.roots.keys().map(|&position| LeafKey { level: cover.top, position });
+    let in_view: u64 = roots.map(|root| existing(root).size().map(u64::from).iter().product::<u64>()).sum();
+    prop_assert_eq!(covered, in_view);
+
+    let drawn: Vec<LeafKey> = leaves.iter().filter(|(_, empty)| !empty).map(|(leaf, _)| *leaf).collect();
+    for &a in &drawn {
+        for &b in drawn.iter().filter(|b| a.level > b.level + 1) {
+            prop_assert!(!touch(a, b), "{:?} touches {:?}", a, b);
+        }
+        prop_assert_eq!(cover.finer_neighbours(a).alternating_edge(), None, "{:?}", a);
+        // Detail is at least what was asked for.
+        let width = f64::from(1u32 << a.level);
+        let nearest = viewers.iter().map(|viewer| distance_squared(*viewer, a)).fold(f64::INFINITY, f64::min);
+        let limit = settings.falloff * width;
+        prop_assert!(a.level == 0 || nearest >= limit * limit, "{:?} is too coarse", a);
+    }
+    Ok(())
+}
+
+fn viewer() -> impl Strategy<Value = [f64; 3]> {
+    prop_oneof![4 => [-45.0..50.0f64, -15.0..15.0f64, -40.0..45.0f64], 1 => proptest::array::uniform3(-1e12..1e12f64)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn covers_keep_their_promises(
+        viewers in prop::collection::vec(viewer(), 0..4),
+        (levels, falloff, view_distance) in (1..6u8, 1.75..4.0f64, 1.0..40.0f64),
+        steps in prop::collection::vec((any::<prop::sample::Index>(), proptest::array::uniform3(-3.0..3.0f64)), 0..4),
+    ) {
+        let (settings, mut viewers) = (settings(levels, falloff, view_distance), viewers);
+        let mut calls = BTreeSet::new();
+        let mut cover = LevelCover::new(&viewers, &settings, None, |key| {
+            assert!(calls.insert(key), "{key:?} was asked for twice");
+            is_empty(key)
+        })?;
+        check(&cover, &viewers, &settings)?;
+        for (which, offset) in steps {
+            if let Some(viewer) = viewers.len().checked_sub(1).map(|last| which.index(last + 1)) {
+                viewers[viewer] = [0, 1, 2].map(|axis| viewers[viewer][axis] + offset[axis]);
+            }
+            cover = LevelCover::new(&viewers, &settings, Some(&cover), is_empty)?;
+            check(&cover, &viewers, &settings)?;
+        }
+    }
+
+    /// All chunks that a viewer sees, and no other, at one level.
+    #[test]
+    fn one_level_is_a_ball_of_chunks(viewer in [-40.0..48.0f64, -24.0..17.0f64, -33.0..40.0f64], distance in 0.5..9.0f64) {
+        let cover = LevelCover::new(&[viewer], &settings(1, 3.0, distance), None, is_empty)?;
+        for chunk in EXTENT.points().step_by(3) {
+            let key = LeafKey { level: 0, position: chunk };
+            let expected = (distance_squared(viewer, key) < distance * distance).then_some(key);
+            prop_assert_eq!(cover.leaf_at(chunk), expected);
+        }
+    }
+
+    /// A viewer that goes to and fro within the hysteresis changes nothing, after the first time.
+    #[test]
+    fn small_steps_change_nothing(viewer in viewer(), offset in proptest::array::uniform3(-0.05..0.05f64)) {
+        // A step of less than 0.1 is less than the hysteresis of the finest leaves that can be merged.
+        let settings = settings(5, 2.0, 30.0);
+        let there = [0, 1, 2].map(|axis| viewer[axis] + offset[axis]);
+        let first = LevelCover::new(&[viewer], &settings, None, is_empty)?;
+        let second = LevelCover::new(&[there], &settings, Some(&first), is_empty)?;
+        let mut former = second;
+        for place in [viewer, there, viewer] {
+            let cover = LevelCover::new(&[place], &settings, Some(&former), is_empty)?;
+            let [now, before] = [&cover, &former].map(|cover| cover.leaves().collect::<BTreeSet<_>>());
+            prop_assert_eq!(now, before);
+            former = cover;
+        }
+    }
+}
+
+#[test]
+fn two_viewers_make_diagonal_leaves_split_further() {
+    // Without an extent and with a surface everywhere: viewers across from each other along a diagonal of an edge.
+    let settings = LevelSettings { levels: 3, falloff: 1.75, view_distance: 9.0, hysteresis: 0.0, extent: EXTENT };
+    let mut splits = 0;
+    for step in 0..60 {
+        let at = f64::from(step) / 10.0;
+        let viewers = [[at, 0.5, at], [at - 7.0, 0.5, at - 7.0]];
+        let cover = LevelCover::new(&viewers, &settings, None, |_| false).unwrap();
+        let drawn: Vec<LeafKey> = cover.leaves().map(|(leaf, _)| leaf).collect();
+        for &leaf in &drawn {
+            assert_eq!(cover.finer_neighbours(leaf).alternating_edge(), None);
+            assert!(drawn.iter().all(|&other| leaf.level <= other.level + 1 || !touch(leaf, other)));
+        }
+        let wanted = |key: LeafKey| {
+            viewers.iter().any(|v| {
+                let limit = 1.75 * f64::from(1u32 << key.level);
+                distance_squared(*v, key) < limit * limit
+            })
+        };
+        let parents = drawn
+            .iter()
+            .filter(|leaf| leaf.level < 2)
+            .map(|leaf| LeafKey { level: leaf.level + 1, position: leaf.position.map(|v| v >> 1) });
+        splits += parents.collect::<BTreeSet<_>>().into_iter().filter(|&parent| !wanted(parent)).count();
+    }
+    assert!(splits > 0, "some edge alternates without further splits");
+}
+
+#[test]
+fn bad_settings_are_refused() {
+    let good = LevelSettings::default();
+    let refusal = |settings: LevelSettings, viewer: f64| {
+        LevelCover::new(&[[viewer, 0.0, 0.0]], &settings, None, |_| true).expect_err("the settings are bad").to_string()
+    };
+    for levels in [0, 8] {
+        let expected = alloc::format!("a cover has 1 to 7 levels, but {levels} were asked for");
+        assert_eq!(refusal(LevelSettings { levels, ..good }, 0.0), expected);
+    }
+    for falloff in [f64::NAN, 1.7, f64::INFINITY] {
+        let expected = alloc::format!("falloff must be 1.75 or more, but it is {falloff}");
+        assert_eq!(refusal(LevelSettings { falloff, ..good }, 0.0), expected);
+    }
+    for view_distance in [f64::NAN, 0.0, f64::INFINITY] {
+        let expected = alloc::format!("view_distance must be above 0, but it is {view_distance}");
+        assert_eq!(refusal(LevelSettings { view_distance, ..good }, 0.0), expected);
+    }
+    for hysteresis in [f64::NAN, -0.1, 1.1] {
+        let expected = alloc::format!("hysteresis must be from 0 to 1, but it is {hysteresis}");
+        assert_eq!(refusal(LevelSettings { hysteresis, ..good }, 0.0), expected);
+    }
+    assert_eq!(refusal(good, f64::NAN), "viewers must be at finite places, but one is at [NaN, 0.0, 0.0]");
+    for settings in [
+        LevelSettings { view_distance: 1e300, ..good },
+        LevelSettings { levels: 1, view_distance: 200.0, ..good },
+        LevelSettings { falloff: 1e9, view_distance: 1e4, ..good },
+    ] {
+        let found = LevelCover::new(&[[0.0; 3]], &settings, None, |_| false).expect_err("there are too many");
+        assert_eq!(found, LevelError::TooManyLeaves);
+    }
+    // No viewer sees nothing; a viewer far outside the lattice sees nothing either.
+    for viewers in [&[][..], &[[1e300; 3]]] {
+        assert_eq!(LevelCover::new(viewers, &good, None, |_| false).unwrap().leaves().count(), 0);
+    }
+}
