@@ -1,11 +1,14 @@
-//! [`LevelCover`]: which chunks of an octree to draw, and at which level of detail.
+//! [`LevelCover`]: which chunks of an octree to draw, and at which level of detail; [`LeafBlock`]: their samples.
 
 mod balance;
+mod block;
 mod tree;
 
 use alloc::{collections::BTreeMap, vec::Vec};
 
 use thiserror::Error;
+
+pub use block::{LeafBlock, LevelSource};
 
 use crate::{lattice::Region, mesher::FinerNeighbours};
 use tree::{Node, State};

@@ -41,8 +41,8 @@
 //!
 //! # Levels of detail
 //! [`Mesher::mesh_leaf`] meshes a chunk beside neighbours that are one level finer. The seam is part of its mesh, so that
-//! nothing special is needed to draw it. [`LevelCover`] chooses the chunks for the places of viewers. [`MeshUnion`] judges
-//! the meshes of many chunks as one surface.
+//! nothing special is needed to draw it. [`LevelCover`] chooses the chunks for the places of viewers, [`LeafBlock`] fills
+//! their samples from a [`Source`], and [`MeshUnion`] judges the meshes of many chunks as one surface.
 //!
 //! # Guaranteed
 //! - Within a chunk and across chunks, the surface is closed, 2-manifold, consistently oriented and free of zero-area
@@ -133,7 +133,7 @@ pub use grid::{
     MIN_CHUNK_CELLS, Neighbourhood, NeighbourhoodView, SamplePool,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
-pub use levels::{LeafKey, LevelCover, LevelError, LevelSettings};
+pub use levels::{LeafBlock, LeafKey, LevelCover, LevelError, LevelSettings, LevelSource};
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
 pub use mesher::{FinerNeighbours, LeafError, LeafSamples, MeshError, MeshSettings, Mesher, SlabMesher, Topology};

@@ -64,6 +64,34 @@ impl Border {
         })
     }
 
+    /// Intersects a box of samples of a level with the border's box, as a surface at `isovalue` reads them. `min`: the
+    /// lowest lattice point, in points of the level. `size`: points per axis.
+    pub(crate) fn clip_box<W: Weight>(
+        &self,
+        level: u8,
+        min: [i32; 3],
+        size: [u32; 3],
+        isovalue: f32,
+        weights: &mut [W],
+        materials: &mut [u8],
+    ) {
+        let coordinate = |axis: usize, layer: u32| (i64::from(min[axis]) + i64::from(layer)) << level;
+        let layers = || (0..3).flat_map(|axis| (0..size[axis]).map(move |layer| (axis, layer)));
+        // Points that no chunk owns are the border's alone.
+        for (axis, layer) in layers() {
+            if !(self.min[axis]..self.max[axis]).contains(&coordinate(axis, layer)) {
+                each_of_layer(axis, layer, size, |index| (weights[index], materials[index]) = (W::INSIDE, 0));
+            }
+        }
+        for (axis, layer) in layers() {
+            let depth = self.depth_along(axis, coordinate(axis, layer));
+            if depth <= DEPTH << level {
+                let least = wall(depth, isovalue);
+                each_of_layer(axis, layer, size, |index| weights[index] = larger(weights[index], least));
+            }
+        }
+    }
+
     /// The number of points that `point` lies inside of the nearest plane; 0 on it, negative beyond it.
     fn depth(&self, point: [i64; 3]) -> i64 {
         (0..3).map(|axis| self.depth_along(axis, point[axis])).fold(i64::MAX, i64::min)
@@ -84,6 +112,19 @@ pub(super) fn layer_indices(axis: usize, layer: usize, size: usize) -> impl Iter
     let strides = [1, size, size * size];
     let [along, across] = [strides[(axis + 1) % 3], strides[(axis + 2) % 3]];
     (0..size).flat_map(move |j| (0..size).map(move |i| layer * strides[axis] + i * along + j * across))
+}
+
+/// Calls a function with the index of each sample of layer `layer` across `axis` of a box.
+fn each_of_layer(axis: usize, layer: u32, size: [u32; 3], mut call: impl FnMut(usize)) {
+    let [nx, ny, _] = size.map(|v| v as usize);
+    let mut ranges = size.map(|v| 0..v as usize);
+    ranges[axis] = layer as usize..layer as usize + 1;
+    let [x, y, z] = ranges;
+    for k in z {
+        for j in y.clone() {
+            x.clone().for_each(|i| call(i + nx * (j + ny * k)));
+        }
+    }
 }
 
 /// The larger weight; a NaN in `a`, which counts as outside, stays.

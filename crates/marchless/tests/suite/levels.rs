@@ -12,6 +12,7 @@ use crate::support::TestWeight;
 use cover::{Cover, Leaf};
 use field::Field;
 
+mod blocks;
 mod cover;
 mod field;
 mod refusals;

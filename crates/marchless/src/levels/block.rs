@@ -1,0 +1,255 @@
+//! [`LeafBlock`]: the samples of a leaf and of its finer neighbours' faces, filled from a source.
+
+use alloc::{vec, vec::Vec};
+use core::ops::Range;
+
+use super::{LeafKey, LevelCover};
+use crate::{
+    cell::Face,
+    grid::border::Border,
+    lattice::{MAX_CHUNK_CELLS, Region, Samples, Shape},
+    mesher::{FinerNeighbours, LeafError, LeafSamples},
+    sample::Weight,
+    source::{Source, SourceRegion},
+};
+
+/// What leaves are filled from.
+#[derive(Clone, Copy)]
+pub struct LevelSource<'a> {
+    /// The field of distances and materials.
+    pub source: &'a dyn Source,
+    /// Cells per axis of a leaf, 2 to 62; others are clamped.
+    pub cells: u32,
+    /// World units between neighbouring lattice points of level 0.
+    pub spacing: f64,
+    /// The border of a bounded volume, if it has one: its outermost planes of lattice points, in voxels of level 0, as
+    /// [`Grid::planes`](crate::Grid::planes) gives them. What lies beyond is air, and surfaces are closed half a voxel
+    /// inside.
+    pub planes: Option<Region>,
+    /// The isovalue at which leaves will be meshed, in voxels of level 0. It matters only where there are `planes`.
+    pub isovalue: f32,
+}
+
+/// The samples that the mesh of a leaf is made from. The caller keeps and reuses a block.
+///
+/// Samples of all levels are in voxels of level 0: at level `k`, they are the source's answers times 2ᵏ. A lattice point
+/// has one sample, that of the finest leaf that touches it, in the blocks of all leaves. So the meshes of all leaves of a
+/// cover fit, even if the source answers differently at different levels.
+///
+/// ```
+/// use marchless::{
+///     Bound, LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion, Mesher,
+/// };
+///
+/// // A planet of radius 100 around the origin, seen from above its north pole.
+/// let planet = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - 100.0;
+/// let cells = 16;
+/// let level_source = LevelSource { source: &planet, cells, spacing: 1.0, planes: None, isovalue: 0.0 };
+/// let settings = LevelSettings { levels: 4, falloff: 2.0, view_distance: 20.0, ..LevelSettings::default() };
+/// // A chunk whose middle is farther from the surface than its corners are from its middle is empty.
+/// let is_empty = |leaf: LeafKey| {
+///     let half = f64::from(cells << leaf.level) / 2.0;
+///     planet(leaf.position.map(|v| (2.0 * f64::from(v) + 1.0) * half)).abs() > 1.75 * half + 4.0
+/// };
+/// let cover = LevelCover::new(&[[0.0, 7.0, 0.0]], &settings, None, is_empty)?;
+///
+/// let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
+/// let mut union = MeshUnion::new();
+/// for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
+///     block.fill(&level_source, &cover, leaf);
+///     mesher.mesh_leaf(&block.samples()?, &MeshSettings::default(), &mut mesh)?;
+///     union.add(&mesh, leaf.region().min.map(|v| i64::from(v) * i64::from(cells)), leaf.level);
+/// }
+/// let report = union.report();
+/// assert!(report.is_closed() && report.is_clean() && report.components == 1, "{report}");
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct LeafBlock<W = i16> {
+    own: SampleBox<W>,
+    /// By face; filled where its neighbour is finer.
+    faces: [SampleBox<W>; 6],
+    finer: FinerNeighbours,
+    /// Scratch memory: what a source answers.
+    distances: Vec<f32>,
+}
+
+impl<W: Weight> LeafBlock<W> {
+    /// A block of a single sample of air, until [`LeafBlock::fill`] fills it.
+    pub fn new() -> Self {
+        let faces = core::array::from_fn(|_| SampleBox::new());
+        Self { own: SampleBox::new(), faces, finer: FinerNeighbours::NONE, distances: Vec::new() }
+    }
+
+    /// Fills the block for a leaf of a cover. Allocates little once the block has been filled before.
+    pub fn fill(&mut self, from: &LevelSource<'_>, cover: &LevelCover, leaf: LeafKey) {
+        let cells = from.cells.clamp(2, MAX_CHUNK_CELLS);
+        let mut filler = Filler { from, cover, cells: cells as i32, distances: &mut self.distances };
+        self.finer = cover.finer_neighbours(leaf);
+        let corner = leaf.position.map(|v| v.saturating_mul(cells as i32));
+        filler.fill(leaf.level, corner.map(|v| v.saturating_sub(1)), [cells + 3; 3], &mut self.own);
+        for face in Face::ALL.into_iter().filter(|&face| self.finer.contains_face(face)) {
+            let (mut min, mut size) = (corner.map(|v| v.saturating_mul(2).saturating_sub(1)), [2 * cells + 3; 3]);
+            if face.is_high() {
+                min[face.axis()] = min[face.axis()].saturating_add(2 * cells as i32);
+            }
+            size[face.axis()] = 3;
+            // A leaf of level 0 has no finer neighbours.
+            filler.fill(leaf.level.saturating_sub(1), min, size, &mut self.faces[face.index()]);
+        }
+    }
+
+    /// The samples, for [`Mesher::mesh_leaf`](crate::Mesher::mesh_leaf).
+    ///
+    /// # Errors
+    /// [`LeafError::Samples`] before the first [`LeafBlock::fill`], and [`LeafError::PointsDiffer`] if the source gives
+    /// two answers for one point.
+    pub fn samples(&self) -> Result<LeafSamples<'_, W>, LeafError> {
+        let faces = Face::ALL.map(|face| self.finer.contains_face(face).then(|| self.faces[face.index()].samples()));
+        LeafSamples::new(self.own.samples().padded(), self.finer, faces)
+    }
+}
+
+impl<W: Weight> Default for LeafBlock<W> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A box of samples.
+#[derive(Clone, Debug)]
+struct SampleBox<W> {
+    size: [u32; 3],
+    weights: Vec<W>,
+    materials: Vec<u8>,
+}
+
+impl<W: Weight> SampleBox<W> {
+    fn new() -> Self {
+        Self { size: [1; 3], weights: vec![W::OUTSIDE], materials: vec![0] }
+    }
+
+    fn samples(&self) -> Samples<'_, W> {
+        Shape::new(self.size)
+            .map(|shape| Samples::new(shape, &self.weights).and_then(|samples| samples.with_materials(&self.materials)))
+            .expect("a leaf has few cells")
+            .expect("samples fill their box")
+    }
+
+    fn index(&self, at: [u32; 3]) -> usize {
+        let [x, y, z] = at.map(|v| v as usize);
+        let [nx, ny, _] = self.size.map(|v| v as usize);
+        x + nx * (y + ny * z)
+    }
+}
+
+/// Fills boxes of samples of any level.
+struct Filler<'a> {
+    from: &'a LevelSource<'a>,
+    cover: &'a LevelCover,
+    cells: i32,
+    distances: &'a mut Vec<f32>,
+}
+
+impl Filler<'_> {
+    /// Fills a box of lattice points of a level with what leaves of that level read there.
+    fn fill<W: Weight>(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox<W>) {
+        self.sample(level, min, size, out);
+        if level == 0 || !self.has_split_places(level, min, size) {
+            return;
+        }
+        // Points between split and whole places have finer samples.
+        let segments = [0, 1, 2].map(|axis| self.segments(min[axis], size[axis]));
+        let mut finer = SampleBox::new();
+        for z in &segments[2] {
+            for y in &segments[1] {
+                for x in &segments[0] {
+                    let part = [x, y, z];
+                    if !self.is_mixed(level, part.map(|segment| segment.places.clone())) {
+                        continue;
+                    }
+                    let start = [0, 1, 2].map(|axis| min[axis].saturating_add(part[axis].points.start as i32));
+                    let len = part.map(|segment| segment.points.len() as u32);
+                    self.fill(level - 1, start.map(|v| v.saturating_mul(2)), len.map(|v| 2 * v - 1), &mut finer);
+                    for k in 0..len[2] {
+                        for j in 0..len[1] {
+                            for i in 0..len[0] {
+                                let from = finer.index([2 * i, 2 * j, 2 * k]);
+                                let to = [i, j, k];
+                                let to = out.index([0, 1, 2].map(|axis| part[axis].points.start + to[axis]));
+                                (out.weights[to], out.materials[to]) = (finer.weights[from], finer.materials[from]);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Fills a box with the source's own samples of a level.
+    fn sample<W: Weight>(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox<W>) {
+        let (width, len) = (f32::from(1u8 << level), size.iter().map(|&v| v as usize).product());
+        let region = SourceRegion { min, size, level, spacing: self.from.spacing * f64::from(width) };
+        self.distances.clear();
+        self.distances.resize(len, 0.0);
+        out.size = size;
+        out.materials.clear();
+        out.materials.resize(len, 0);
+        self.from.source.fill(&region, self.distances, &mut out.materials);
+        out.weights.clear();
+        out.weights.extend(self.distances.iter().map(|distance| W::from_voxels(distance * width)));
+        if let Some(planes) = self.from.planes {
+            let (weights, materials) = (&mut out.weights, &mut out.materials);
+            Border::new(planes).clip_box(level, min, size, self.from.isovalue, weights, materials);
+        }
+    }
+
+    /// Whether any chunk of this level that a box of points touches is split.
+    fn has_split_places(&self, level: u8, min: [i32; 3], size: [u32; 3]) -> bool {
+        let places = [0, 1, 2].map(|axis| {
+            let last = min[axis].saturating_add(size[axis] as i32 - 1);
+            (min[axis].saturating_sub(1)).div_euclid(self.cells)..last.div_euclid(self.cells) + 1
+        });
+        self.places(level, places).any(|is_split| is_split)
+    }
+
+    /// Whether some of these chunks are split and some are not.
+    fn is_mixed(&self, level: u8, places: [Range<i32>; 3]) -> bool {
+        let mut places = self.places(level, places);
+        let first = places.next();
+        places.any(|is_split| Some(is_split) != first)
+    }
+
+    /// Whether each of these chunks is split.
+    fn places(&self, level: u8, [x, y, z]: [Range<i32>; 3]) -> impl Iterator<Item = bool> + '_ {
+        let positions = z.flat_map(move |z| {
+            let x = x.clone();
+            y.clone().flat_map(move |y| x.clone().map(move |x| [x, y, z]))
+        });
+        positions.map(move |position| self.cover.is_split(LeafKey { level, position }))
+    }
+
+    /// The points of a box along one axis: those on borders of chunks one by one, and those between together.
+    fn segments(&self, min: i32, size: u32) -> Vec<Segment> {
+        let mut segments: Vec<Segment> = Vec::new();
+        for point in 0..size {
+            let at = min.saturating_add(point as i32);
+            let place = at.div_euclid(self.cells);
+            let is_border = at.rem_euclid(self.cells) == 0;
+            match segments.last_mut() {
+                Some(last) if !is_border && last.places == (place..place + 1) => last.points.end = point + 1,
+                _ => {
+                    let places = place - i32::from(is_border)..place + 1;
+                    segments.push(Segment { points: point..point + 1, places });
+                }
+            }
+        }
+        segments
+    }
+}
+
+/// Points of a box along one axis that lie in the same chunks, borders included.
+struct Segment {
+    points: Range<u32>,
+    places: Range<i32>,
+}

@@ -1,0 +1,166 @@
+//! Blocks of leaves filled from a source.
+
+use fastrand::Rng;
+use marchless::{
+    Bound, Grid, GridChunk, LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings,
+    MeshUnion, Mesher, Region, Source, SourceRegion,
+};
+
+/// A ball with bumps, which answers differently at each level.
+#[derive(Clone, Copy)]
+struct Bumps {
+    middle: [f64; 3],
+    radius: f64,
+}
+
+impl Bumps {
+    /// The distance in world units, without what differs from level to level.
+    fn distance(&self, position: [f64; 3]) -> f64 {
+        let [x, y, z] = [0, 1, 2].map(|axis| position[axis] - self.middle[axis]);
+        (x * x + y * y + z * z).sqrt() - self.radius + (x / 3.0).sin() + (y / 4.0).cos() * (z / 3.5).sin()
+    }
+}
+
+/// The most by which the distance of [`Bumps`] differs from that of its ball, at any level, in world units.
+const MOST_OFF: f64 = 3.0;
+
+impl Source for Bumps {
+    fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+        let [nx, ny, _] = region.size;
+        for (index, (distance, material)) in (0u32..).zip(distances.iter_mut().zip(materials)) {
+            let at = [index % nx, index / nx % ny, index / (nx * ny)];
+            let position = region.position(at);
+            let seed = position.map(f64::to_bits).into_iter().fold(region.level.into(), |seed: u64, bits| {
+                (seed ^ bits).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(31)
+            });
+            let mut random = Rng::with_seed(seed);
+            let jitter = if region.level == 0 { 0.0 } else { random.f64() - 0.5 };
+            *distance = ((self.distance(position) + jitter) / region.spacing) as f32;
+            *material = random.u8(1..5);
+        }
+    }
+
+    fn bound(&self, region: &SourceRegion) -> Bound {
+        let ends = [region.position([0; 3]), region.position(region.size.map(|size| size - 1))];
+        let [mut nearest, mut farthest] = [0.0f64; 2];
+        for axis in 0..3 {
+            let [low, high] = [0, 1].map(|end: usize| ends[end][axis] - self.middle[axis]);
+            let near = if low > 0.0 { low } else { (-high).max(0.0) };
+            let far = low.abs().max(high.abs());
+            (nearest, farthest) = (nearest + near * near, farthest + far * far);
+        }
+        let [nearest, farthest] = [nearest, farthest].map(|square| square.sqrt() - self.radius);
+        if nearest > MOST_OFF {
+            Bound::Outside
+        } else if farthest < -MOST_OFF {
+            Bound::Inside { material: 1 }
+        } else {
+            Bound::Mixed
+        }
+    }
+}
+
+/// Whether a source is certain that a leaf and four points around it have no surface.
+fn is_empty(source: &LevelSource<'_>, leaf: LeafKey) -> bool {
+    let cells = source.cells as i32;
+    let region = SourceRegion {
+        min: leaf.position.map(|v| v * cells),
+        size: [source.cells + 1; 3],
+        level: leaf.level,
+        spacing: source.spacing * f64::from(1u8 << leaf.level),
+    };
+    let near_planes = source.planes.is_some_and(|planes| {
+        let Region { min, max } = leaf.region();
+        (0..3).any(|axis| min[axis] * cells < planes.min[axis] + 8 || max[axis] * cells > planes.max[axis] - 8)
+    });
+    match source.source.bound(&region.grown(4)) {
+        Bound::Outside => true,
+        Bound::Inside { .. } => !near_planes,
+        Bound::Mixed => false,
+    }
+}
+
+/// Meshes all leaves of a cover that may have a surface.
+fn union(source: &LevelSource<'_>, cover: &LevelCover, settings: &MeshSettings) -> MeshUnion {
+    let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
+    let mut union = MeshUnion::new();
+    for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
+        block.fill(source, cover, leaf);
+        let samples = block.samples().expect("a source has one answer for a point");
+        mesher.mesh_leaf(&samples, settings, &mut mesh).expect("the settings are sound");
+        union.add(&mesh, leaf.region().min.map(|v| i64::from(v) * i64::from(source.cells)), leaf.level);
+    }
+    union
+}
+
+#[test]
+fn whole_covers_are_closed() {
+    let mut random = Rng::with_seed(11);
+    for round in 0..10 {
+        let cells = [4, 8, 5][round % 3];
+        let bumps = Bumps { middle: [(); 3].map(|()| 10.0 * random.f64() - 5.0), radius: 20.0 + 20.0 * random.f64() };
+        // Half of them are cut by the border of a bounded volume.
+        let planes = (round % 2 == 1).then(|| Region::new([-17, -40, -23], [30, 21, 38]));
+        let isovalue = if round % 4 < 2 { 0.0 } else { 1.25 };
+        let source = LevelSource { source: &bumps, cells, spacing: 1.0, planes, isovalue };
+        let settings = LevelSettings { levels: 4, falloff: 1.75, view_distance: 40.0, ..LevelSettings::default() };
+        let viewers: Vec<[f64; 3]> =
+            (0..random.usize(1..4)).map(|_| [(); 3].map(|()| (random.f64() - 0.5) * 80.0 / f64::from(cells))).collect();
+        let cover = LevelCover::new(&viewers, &settings, None, |leaf| is_empty(&source, leaf));
+        let cover = cover.expect("the settings are sound");
+        let levels: Vec<u8> = cover.leaves().filter(|(_, empty)| !empty).map(|(leaf, _)| leaf.level).collect();
+        assert!(levels.iter().max() > levels.iter().min());
+        let union = union(&source, &cover, &MeshSettings { isovalue, ..MeshSettings::default() });
+        let report = union.report();
+        assert!(report.triangles > 500 && report.is_closed() && report.is_clean(), "round {round}: {report}");
+    }
+}
+
+/// At one level, leaves are the chunks of a grid.
+#[test]
+fn leaves_of_level_0_are_chunks_of_a_grid() {
+    let bumps = Bumps { middle: [3.0, -2.0, 7.0], radius: 21.0 };
+    let chunks = Region::new([-2, -3, -1], [4, 2, 3]);
+    let mut grid = Grid::<i16>::bounded(8, chunks).expect("the grid is small");
+    for position in chunks.points() {
+        grid.insert(position, GridChunk::from_source(&bumps, position, 8, 1.0)).expect("it is within the bounds");
+    }
+    let source = LevelSource { source: &bumps, cells: 8, spacing: 1.0, planes: grid.planes(), isovalue: 0.0 };
+    let settings = LevelSettings { levels: 1, view_distance: 30.0, extent: chunks, ..LevelSettings::default() };
+    let cover = LevelCover::new(&[[0.0; 3]], &settings, None, |_| false).expect("the settings are sound");
+    let (mut mesher, mut block) = (Mesher::new(), LeafBlock::<i16>::new());
+    let (mut found, mut expected, mut drawn) = (MeshBuffer::new(), MeshBuffer::new(), 0);
+    for (leaf, _) in cover.leaves() {
+        block.fill(&source, &cover, leaf);
+        mesher.mesh_leaf(&block.samples().unwrap(), &MeshSettings::default(), &mut found).unwrap();
+        grid.mesh_chunk(leaf.position, &mut mesher, &MeshSettings::default(), &mut expected).unwrap();
+        assert_eq!(found, expected, "{leaf:?}");
+        drawn += usize::from(!found.is_empty());
+    }
+    assert!(drawn > 30);
+}
+
+/// At every level, the samples are the source's answers in voxels of level 0.
+#[test]
+fn samples_are_in_voxels_of_level_0() {
+    let slope = |[x, y, z]: [f64; 3]| (3.0 * x - 2.0 * y + 6.0 * z) / 7.0 - 5.0;
+    let source = LevelSource { source: &slope, cells: 6, spacing: 1.0, planes: None, isovalue: 0.0 };
+    let settings = LevelSettings { levels: 7, falloff: 1.75, view_distance: 200.0, ..LevelSettings::default() };
+    let cover = LevelCover::new(&[[0.3; 3]], &settings, None, |_| false).expect("the settings are sound");
+    let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
+    let mut levels = [0; 7];
+    for (leaf, _) in cover.leaves() {
+        block.fill(&source, &cover, leaf);
+        mesher.mesh_leaf(&block.samples().unwrap(), &MeshSettings::default(), &mut mesh).unwrap();
+        levels[usize::from(leaf.level)] += mesh.positions.len();
+        let (corner, cell) = (leaf.region().min.map(|v| f64::from(v) * 6.0), f64::from(1u8 << leaf.level));
+        for position in &mesh.positions {
+            let at = [0, 1, 2].map(|axis| corner[axis] + f64::from(position[axis]) * cell);
+            // Samples are rounded to 1/256 voxel and crossings to 2⁻¹⁴ of a cell; where lattice points make room, vertices
+            // move by up to an eighth of a cell along each axis.
+            let moved = if cover.finer_neighbours(leaf).is_empty() { 0.0 } else { 11.0 / 7.0 / 8.0 * cell };
+            assert!(slope(at).abs() < 0.01 * cell + moved, "{at:?} of {leaf:?} is {} off", slope(at));
+        }
+    }
+    assert!(levels.iter().all(|&vertices| vertices > 0), "{levels:?}");
+}
