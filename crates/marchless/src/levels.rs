@@ -2,6 +2,7 @@
 
 mod balance;
 mod block;
+mod change;
 mod tree;
 
 use alloc::{collections::BTreeMap, vec::Vec};
@@ -9,6 +10,7 @@ use alloc::{collections::BTreeMap, vec::Vec};
 use thiserror::Error;
 
 pub use block::{LeafBlock, LevelSource};
+pub use change::LevelChange;
 
 use crate::{lattice::Region, mesher::FinerNeighbours};
 use tree::{Node, State};
@@ -29,6 +31,12 @@ impl LeafKey {
     pub fn region(self) -> Region {
         let scaled = |v: i64| (v << self.level).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
         Region::new(self.position.map(|v| scaled(i64::from(v))), self.position.map(|v| scaled(i64::from(v) + 1)))
+    }
+
+    /// The child of one level finer in an octant: bit 0 is its x, bit 1 its y, bit 2 its z.
+    fn child(self, octant: u8) -> Self {
+        let position = [0, 1, 2].map(|axis| 2 * self.position[axis] + i32::from(octant >> axis & 1));
+        Self { level: self.level - 1, position }
     }
 }
 
@@ -124,7 +132,7 @@ impl LevelCover {
 
     /// All leaves, and whether each is empty.
     pub fn leaves(&self) -> impl Iterator<Item = (LeafKey, bool)> + '_ {
-        self.nodes.iter().filter_map(|node| match node.state {
+        self.reachable().filter_map(|node| match node.state {
             State::Leaf => Some((node.key, false)),
             State::Empty => Some((node.key, true)),
             State::Split { .. } | State::Nowhere => None,
@@ -227,10 +235,7 @@ impl Builder<'_> {
     fn split_node(&self, cover: &mut LevelCover, index: u32) -> Result<u32, LevelError> {
         let (key, first) = (cover.nodes[index as usize].key, cover.nodes.len() as u32);
         cover.nodes.extend((0..8).map(|octant| {
-            let key = LeafKey {
-                level: key.level - 1,
-                position: [0, 1, 2].map(|axis| 2 * key.position[axis] + (octant >> axis & 1)),
-            };
+            let key = key.child(octant);
             Node { key, state: if self.exists(key) { State::Leaf } else { State::Nowhere } }
         }));
         cover.nodes[index as usize].state = State::Split { first };

@@ -31,6 +31,12 @@ pub(super) fn balance(cover: &mut LevelCover, builder: &mut Builder<'_>) -> Resu
     Ok(())
 }
 
+/// Whether a leaf with a surface fits those that touch it, as far as it can see: none is more than one level coarser,
+/// and finer and coarser ones alternate at none of its edges.
+pub(super) fn fits(cover: &LevelCover, leaf: LeafKey) -> bool {
+    !alternates(cover, leaf) && too_coarse(cover, leaf).is_none()
+}
+
 /// The 26 directions to a leaf's neighbours.
 fn directions() -> impl Iterator<Item = [i32; 3]> {
     (0..27).map(|place| [place % 3 - 1, place / 3 % 3 - 1, place / 9 - 1]).filter(|direction| *direction != [0; 3])

@@ -1,4 +1,8 @@
-use alloc::{collections::BTreeSet, string::ToString, vec::Vec};
+use alloc::{
+    collections::{BTreeMap, BTreeSet},
+    string::ToString,
+    vec::Vec,
+};
 
 use proptest::prelude::*;
 
@@ -27,6 +31,18 @@ fn touch(a: LeafKey, b: LeafKey) -> bool {
 
 /// Checks everything that a cover promises.
 fn check(cover: &LevelCover, viewers: &[[f64; 3]], settings: &LevelSettings) -> Result<(), TestCaseError> {
+    check_leaves(cover)?;
+    for (leaf, _) in cover.leaves().filter(|(leaf, is_empty)| !is_empty && leaf.level > 0) {
+        // Detail is at least what was asked for.
+        let nearest = viewers.iter().map(|viewer| distance_squared(*viewer, leaf)).fold(f64::INFINITY, f64::min);
+        let limit = settings.falloff * f64::from(1u32 << leaf.level);
+        prop_assert!(nearest >= limit * limit, "{:?} is too coarse", leaf);
+    }
+    Ok(())
+}
+
+/// Checks that leaves cover the roots, once, and that they fit each other.
+fn check_leaves(cover: &LevelCover) -> Result<(), TestCaseError> {
     let leaves: Vec<(LeafKey, bool)> = cover.leaves().collect();
     let existing = |leaf: LeafKey| leaf.region().intersection(&EXTENT);
     let mut covered = 0u64;
@@ -51,11 +67,6 @@ fn check(cover: &LevelCover, viewers: &[[f64; 3]], settings: &LevelSettings) -> 
             prop_assert!(!touch(a, b), "{:?} touches {:?}", a, b);
         }
         prop_assert_eq!(cover.finer_neighbours(a).alternating_edge(), None, "{:?}", a);
-        // Detail is at least what was asked for.
-        let width = f64::from(1u32 << a.level);
-        let nearest = viewers.iter().map(|viewer| distance_squared(*viewer, a)).fold(f64::INFINITY, f64::min);
-        let limit = settings.falloff * width;
-        prop_assert!(a.level == 0 || nearest >= limit * limit, "{:?} is too coarse", a);
     }
     Ok(())
 }
@@ -87,6 +98,60 @@ proptest! {
             cover = LevelCover::new(&viewers, &settings, Some(&cover), is_empty)?;
             check(&cover, &viewers, &settings)?;
         }
+    }
+
+    /// Changes lead from one cover to another, and all covers between fit.
+    #[test]
+    fn changes_lead_from_cover_to_cover(
+        [from, to] in proptest::array::uniform2(prop::collection::vec(viewer(), 0..3)),
+        (levels, falloff) in (1..5u8, 1.75..3.0f64),
+        distances in proptest::array::uniform2(0.5..2.5f64),
+    ) {
+        let [from_distance, to_distance] = distances.map(|distance| distance * f64::from(1u32 << (levels - 1)));
+        let cover = |viewers: &[[f64; 3]], distance| {
+            LevelCover::new(viewers, &settings(levels, falloff, distance), None, is_empty)
+        };
+        let (start, target) = (cover(&from, from_distance)?, cover(&to, to_distance)?);
+        let changes = start.changes_to(&target).expect("the numbers of levels are the same");
+        let mut now = start.clone();
+        let drawn = |cover: &LevelCover| -> BTreeMap<LeafKey, (bool, FinerNeighbours)> {
+            cover.leaves().map(|(leaf, is_empty)| (leaf, (is_empty, cover.finer_neighbours(leaf)))).collect()
+        };
+        let mut shown = drawn(&now);
+        for (number, change) in changes.iter().enumerate() {
+            let overlaps_next = changes.get(number + 1).is_some_and(|next| change.overlaps(next));
+            if let Some(next) = changes.get(number + 1).filter(|_| !overlaps_next) {
+                // Either may come first.
+                let (mut other, mut this) = (now.clone(), now.clone());
+                other.apply(next);
+                check_leaves(&other)?;
+                other.apply(change);
+                this.apply(change);
+                this.apply(next);
+                prop_assert_eq!(drawn(&other), drawn(&this));
+            }
+            now.apply(change);
+            check_leaves(&now)?;
+            for leaf in &change.removed {
+                prop_assert!(shown.remove(leaf).is_some(), "{:?} was not drawn", leaf);
+            }
+            for &(leaf, is_empty) in &change.added {
+                prop_assert_eq!(shown.insert(leaf, (is_empty, now.finer_neighbours(leaf))), None);
+            }
+            for &leaf in &change.remeshed {
+                let finer = now.finer_neighbours(leaf);
+                let before = shown.insert(leaf, (false, finer));
+                prop_assert!(before.is_some_and(|(is_empty, before)| !is_empty && before != finer));
+            }
+            let mut expected = drawn(&now);
+            // Empty leaves have no mesh that could depend on their neighbours.
+            for map in [&mut shown, &mut expected] {
+                map.values_mut().filter(|(is_empty, _)| *is_empty).for_each(|leaf| leaf.1 = FinerNeighbours::NONE);
+            }
+            prop_assert_eq!(&shown, &expected);
+        }
+        prop_assert_eq!(drawn(&now), drawn(&target));
+        prop_assert!(now.nodes.len() < 64 || now.nodes.len() <= 2 * now.reachable().count() + 16);
     }
 
     /// All chunks that a viewer sees, and no other, at one level.
@@ -145,6 +210,13 @@ fn two_viewers_make_diagonal_leaves_split_further() {
         splits += parents.collect::<BTreeSet<_>>().into_iter().filter(|&parent| !wanted(parent)).count();
     }
     assert!(splits > 0, "some edge alternates without further splits");
+}
+
+#[test]
+fn covers_of_other_numbers_of_levels_have_no_way_between() {
+    let cover = |levels| LevelCover::new(&[[0.0; 3]], &settings(levels, 2.0, 9.0), None, is_empty).unwrap();
+    assert_eq!(cover(2).changes_to(&cover(3)), None);
+    assert_eq!(cover(3).changes_to(&cover(3)), Some(Vec::new()));
 }
 
 #[test]

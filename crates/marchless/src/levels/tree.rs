@@ -1,5 +1,7 @@
 //! The nodes of a [`LevelCover`], and how they are found.
 
+use alloc::vec::Vec;
+
 use super::{LeafKey, LevelCover};
 
 /// A chunk of a cover's octree.
@@ -37,5 +39,38 @@ impl LevelCover {
             index = first + x + 2 * y + 4 * z;
         }
         Some(index)
+    }
+
+    /// The nodes that can be reached from the roots, in order.
+    pub(super) fn reachable(&self) -> impl Iterator<Item = &Node> + '_ {
+        let mut to_visit: Vec<u32> = self.roots.values().rev().copied().collect();
+        core::iter::from_fn(move || {
+            let node = &self.nodes[to_visit.pop()? as usize];
+            if let State::Split { first } = node.state {
+                to_visit.extend((first..first + 8).rev());
+            }
+            Some(node)
+        })
+    }
+
+    /// Drops the nodes that cannot be reached any more, once they are the most.
+    pub(super) fn compact(&mut self) {
+        if self.nodes.len() < 64 || 2 * self.reachable().count() > self.nodes.len() {
+            return;
+        }
+        let former = core::mem::take(&mut self.nodes);
+        let mut to_copy = Vec::new();
+        for root in self.roots.values_mut() {
+            let copy = self.nodes.len() as u32;
+            to_copy.push((core::mem::replace(root, copy), copy));
+            self.nodes.push(former[to_copy[to_copy.len() - 1].0 as usize]);
+            while let Some((from, to)) = to_copy.pop() {
+                let State::Split { first } = former[from as usize].state else { continue };
+                let copied = self.nodes.len() as u32;
+                self.nodes.extend_from_slice(&former[first as usize..][..8]);
+                self.nodes[to as usize].state = State::Split { first: copied };
+                to_copy.extend((0..8).map(|child| (first + child, copied + child)));
+            }
+        }
     }
 }
