@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use criterion::{BenchmarkGroup, measurement::WallTime};
 use marchless::Weight;
-use marchless_benches::aligned;
+use marchless_benches::{aligned, duration};
 
 use crate::case::Case;
 
@@ -216,14 +216,4 @@ impl Results {
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
-}
-
-/// A time with about three digits.
-pub(crate) fn duration(seconds: f64) -> String {
-    match seconds {
-        ..1e-4 => format!("{:.1} µs", seconds * 1e6),
-        ..1e-3 => format!("{:.0} µs", seconds * 1e6),
-        ..0.1 => format!("{:.2} ms", seconds * 1e3),
-        _ => format!("{:.0} ms", seconds * 1e3),
-    }
 }

@@ -14,9 +14,9 @@ use std::{
 };
 
 use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
-use marchless_benches::Field;
+use marchless_benches::{Field, duration};
 
-use crate::results::{duration, median};
+use crate::results::median;
 
 /// The environment variable that makes this program a worker; its value is the number of chunks per axis.
 pub(crate) const WORKER: &str = "MARCHLESS_BENCH_WORKER";

@@ -6,7 +6,7 @@ use std::thread;
 
 use noise::{Fbm, MultiFractal, NoiseFn, Perlin};
 
-pub use table::aligned;
+pub use table::{aligned, duration};
 
 /// A kind of field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -20,3 +20,13 @@ pub fn aligned(rows: &[impl AsRef<[String]>]) -> String {
     }
     table
 }
+
+/// A time with about three digits.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        ..1e-4 => format!("{:.1} µs", seconds * 1e6),
+        ..1e-3 => format!("{:.0} µs", seconds * 1e6),
+        ..0.1 => format!("{:.2} ms", seconds * 1e3),
+        _ => format!("{:.0} ms", seconds * 1e3),
+    }
+}
