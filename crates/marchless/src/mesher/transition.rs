@@ -126,13 +126,20 @@ impl Mesher {
 
 /// The smallest box around all positions.
 fn bounds(positions: &[[f32; 3]]) -> Option<[[f32; 3]; 2]> {
+    // Without NaN, this needs one instruction; `f32::min` needs several.
+    let least = |a: f32, b: f32| if a < b { a } else { b };
+    let most = |a: f32, b: f32| if a > b { a } else { b };
     let first = *positions.first()?;
-    let mut bounds = [first; 2];
-    for position in positions {
-        for axis in 0..3 {
-            bounds[0][axis] = bounds[0][axis].min(position[axis]);
-            bounds[1][axis] = bounds[1][axis].max(position[axis]);
+    // Four positions fill three vectors.
+    let (fours, rest) = positions.as_chunks::<4>();
+    let [mut min, mut max] = [[first; 4]; 2];
+    for four in fours {
+        for ((min, max), &v) in min.as_flattened_mut().iter_mut().zip(max.as_flattened_mut()).zip(four.as_flattened()) {
+            (*min, *max) = (least(v, *min), most(v, *max));
         }
     }
-    Some(bounds)
+    let all = min.iter().chain(&max).chain(rest);
+    Some(all.fold([first; 2], |[min, max], position| {
+        [[0, 1, 2].map(|axis| least(position[axis], min[axis])), [0, 1, 2].map(|axis| most(position[axis], max[axis]))]
+    }))
 }

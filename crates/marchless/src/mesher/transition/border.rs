@@ -6,7 +6,7 @@ use super::{
     finer::Displacements,
     leaf::{FacePlane, LeafSamples},
 };
-use crate::sample::Weight;
+use crate::{cell::Face, sample::Weight};
 
 /// The numbers of the vertices on the coarse edges of each face behind which a neighbour is finer.
 #[derive(Clone, Debug)]
@@ -47,7 +47,8 @@ impl BorderVertices {
             }
             let low = position.map(|v| v as u32);
             let Some(axis) = (0..3).find(|&axis| position[axis] != low[axis] as f32) else { continue };
-            for plane in planes.iter().flatten().filter(|plane| plane.axis != axis && plane.holds(low, cells)) {
+            let faces = (0..3).filter(|&across| across != axis).filter_map(|across| face_at(low, across, cells));
+            for plane in faces.filter_map(|face| planes[face.index()].as_ref()) {
                 let along = usize::from(plane.axes[1] == axis);
                 let index = edge_index(plane, along, plane.axes.map(|axis| low[axis] as usize));
                 self.faces[plane.face.index()][index] = vertex;
@@ -75,9 +76,8 @@ const fn edge_index(plane: &FacePlane, along: usize, at: [usize; 2]) -> usize {
     if along == 0 { at[0] + u * at[1] } else { u * (v + 1) + at[0] + (u + 1) * at[1] }
 }
 
-impl FacePlane {
-    /// True if a lattice point of the leaf lies on the face.
-    fn holds(&self, point: [u32; 3], cells: [u32; 3]) -> bool {
-        point[self.axis] == if self.face.is_high() { cells[self.axis] } else { 0 }
-    }
+/// The face of the leaf across `axis` on which a lattice point lies.
+fn face_at(point: [u32; 3], axis: usize, cells: [u32; 3]) -> Option<Face> {
+    let is_high = point[axis] == cells[axis];
+    (is_high || point[axis] == 0).then(|| Face::new(2 * axis as u8 + u8::from(is_high)))
 }

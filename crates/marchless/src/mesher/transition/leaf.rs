@@ -113,6 +113,7 @@ impl<'a, W: Weight> LeafSamples<'a, W> {
 }
 
 /// Whether two samples for one lattice point differ; NaN equals NaN.
+#[inline(always)]
 fn differ<W: Weight>(a: &Samples<'_, W>, a_index: usize, b: &Samples<'_, W>, b_index: usize) -> bool {
     let [a_weight, b_weight] = [a.weights()[a_index], b.weights()[b_index]];
     let is_nan = |weight: W| weight.to_voxels().is_nan();
