@@ -64,6 +64,14 @@ impl Border {
         })
     }
 
+    /// True if any point of a box of points of a level is clipped. `min`: the lowest one, in points of the level.
+    pub(crate) fn cuts(&self, level: u8, min: [i32; 3], size: [u32; 3]) -> bool {
+        // Two opposite corners hold the coordinates nearest to the planes.
+        let ends = [[0; 3], size.map(|size| size.saturating_sub(1))];
+        let at = |end: [u32; 3]| [0, 1, 2].map(|axis| (i64::from(min[axis]) + i64::from(end[axis])) << level);
+        ends.iter().any(|&end| self.depth(at(end)) <= DEPTH << level)
+    }
+
     /// Intersects a box of samples of a level with the border's box, as a surface at `isovalue` reads them. `min`: the
     /// lowest lattice point, in points of the level. `size`: points per axis.
     pub(crate) fn clip_box<W: Weight>(

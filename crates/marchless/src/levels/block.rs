@@ -10,7 +10,7 @@ use crate::{
     lattice::{MAX_CHUNK_CELLS, Region, Samples, Shape},
     mesher::{FinerNeighbours, LeafError, LeafSamples},
     sample::Weight,
-    source::{Source, SourceRegion},
+    source::{BOUND_MARGIN, Bound, Source, SourceRegion},
 };
 
 /// What leaves are filled from.
@@ -28,6 +28,33 @@ pub struct LevelSource<'a> {
     pub planes: Option<Region>,
     /// The isovalue at which leaves will be meshed, in voxels of level 0. It matters only where there are `planes`.
     pub isovalue: f32,
+}
+
+impl LevelSource<'_> {
+    /// True if a leaf is certain to have no surface: [`Source::bound`] says so of the leaf and of four lattice points of
+    /// its level around it, and no border cuts solid ground near it. It suits [`LevelCover::new`].
+    pub fn is_empty(&self, leaf: LeafKey) -> bool {
+        let cells = self.cells();
+        let region = SourceRegion {
+            min: leaf.position.map(|v| v.saturating_mul(cells as i32)),
+            size: [cells + 1; 3],
+            level: leaf.level,
+            spacing: self.spacing * f64::from(1u32 << leaf.level.min(31)),
+        }
+        .grown(BOUND_MARGIN);
+        match self.source.bound(&region) {
+            Bound::Outside => true,
+            Bound::Inside { .. } => {
+                let cut = |planes| Border::new(planes).cuts(leaf.level, region.min, region.size);
+                !self.planes.is_some_and(cut)
+            }
+            Bound::Mixed => false,
+        }
+    }
+
+    fn cells(&self) -> u32 {
+        self.cells.clamp(2, MAX_CHUNK_CELLS)
+    }
 }
 
 /// The samples that the mesh of a leaf is made from. The caller keeps and reuses a block.
@@ -83,7 +110,7 @@ impl<W: Weight> LeafBlock<W> {
 
     /// Fills the block for a leaf of a cover. Allocates little once the block has been filled before.
     pub fn fill(&mut self, from: &LevelSource<'_>, cover: &LevelCover, leaf: LeafKey) {
-        let cells = from.cells.clamp(2, MAX_CHUNK_CELLS);
+        let cells = from.cells();
         let mut filler = Filler { from, cover, cells: cells as i32, distances: &mut self.distances };
         self.finer = cover.finer_neighbours(leaf);
         let corner = leaf.position.map(|v| v.saturating_mul(cells as i32));

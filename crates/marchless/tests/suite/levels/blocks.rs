@@ -2,8 +2,8 @@
 
 use fastrand::Rng;
 use marchless::{
-    Bound, Grid, GridChunk, LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings,
-    MeshUnion, Mesher, Region, Source, SourceRegion,
+    Bound, Grid, GridChunk, LeafBlock, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion,
+    Mesher, Region, Source, SourceRegion,
 };
 
 /// A ball with bumps, which answers differently at each level.
@@ -60,26 +60,6 @@ impl Source for Bumps {
     }
 }
 
-/// Whether a source is certain that a leaf and four points around it have no surface.
-fn is_empty(source: &LevelSource<'_>, leaf: LeafKey) -> bool {
-    let cells = source.cells as i32;
-    let region = SourceRegion {
-        min: leaf.position.map(|v| v * cells),
-        size: [source.cells + 1; 3],
-        level: leaf.level,
-        spacing: source.spacing * f64::from(1u8 << leaf.level),
-    };
-    let near_planes = source.planes.is_some_and(|planes| {
-        let Region { min, max } = leaf.region();
-        (0..3).any(|axis| min[axis] * cells < planes.min[axis] + 8 || max[axis] * cells > planes.max[axis] - 8)
-    });
-    match source.source.bound(&region.grown(4)) {
-        Bound::Outside => true,
-        Bound::Inside { .. } => !near_planes,
-        Bound::Mixed => false,
-    }
-}
-
 /// Meshes all leaves of a cover that may have a surface.
 fn union(source: &LevelSource<'_>, cover: &LevelCover, settings: &MeshSettings) -> MeshUnion {
     let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
@@ -106,7 +86,7 @@ fn whole_covers_are_closed() {
         let settings = LevelSettings { levels: 4, falloff: 1.75, view_distance: 40.0, ..LevelSettings::default() };
         let viewers: Vec<[f64; 3]> =
             (0..random.usize(1..4)).map(|_| [(); 3].map(|()| (random.f64() - 0.5) * 80.0 / f64::from(cells))).collect();
-        let cover = LevelCover::new(&viewers, &settings, None, |leaf| is_empty(&source, leaf));
+        let cover = LevelCover::new(&viewers, &settings, None, |leaf| source.is_empty(leaf));
         let cover = cover.expect("the settings are sound");
         let levels: Vec<u8> = cover.leaves().filter(|(_, empty)| !empty).map(|(leaf, _)| leaf.level).collect();
         assert!(levels.iter().max() > levels.iter().min());
