@@ -61,11 +61,19 @@
 //! # Ok::<(), bevy_marchless::source::SourceError>(())
 //! ```
 //!
+//! # Levels of detail
+//! Coarse levels sample every 2^k-th point. There, noise leaves out waves shorter than two spacings, and fades those
+//! shorter than four; rules for materials count depths and heights from the surface as level 0 would, and go by the
+//! slopes of level 0. So distant ground neither flickers nor changes its colours. Level 0 shows everything. The section
+//! at the end of this page says more.
+//!
 //! Sources compute in floating point. They give the same samples on the same machine and build; they promise nothing
 //! across machines.
 //!
 #![cfg_attr(feature = "noise", doc = include_str!("../docs/sources.md"))]
 
+#[cfg(any(feature = "noise", feature = "png"))]
+mod detail;
 #[cfg(feature = "noise")]
 mod fractal;
 #[cfg(any(feature = "noise", feature = "png"))]

@@ -7,6 +7,8 @@ use super::{SourceError, check, check_length};
 
 /// Noise in several octaves, each finer and weaker than the one before. Its values lie between −1 and 1, mostly between
 /// −0.5 and 0.5.
+///
+/// Coarse levels of detail leave out octaves finer than their spacing, and fade those finer than two spacings.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]

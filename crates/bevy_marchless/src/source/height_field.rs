@@ -4,6 +4,8 @@
 use marchless::{Bound, SourceRegion};
 
 #[cfg(feature = "png")]
+use super::detail::Detail;
+#[cfg(feature = "png")]
 use super::strata::{Stratum, material_at, material_within};
 #[cfg(feature = "png")]
 use super::{BOUND_MARGIN, rows, world_box};
@@ -28,6 +30,9 @@ pub(crate) struct Column {
     pub(crate) slope: f64,
     /// The y part of the ground's unit normal: the factor from heights above the ground to distances.
     pub(crate) up: f64,
+    /// The y part of the unit normal that rules for materials see. It differs from `up` at coarse levels of detail.
+    #[cfg(feature = "noise")]
+    pub(crate) material_up: f64,
 }
 
 impl Column {
@@ -36,11 +41,14 @@ impl Column {
     pub(crate) fn new(height: f64, along_x: [f64; 2], along_z: [f64; 2], run: f64) -> Self {
         let [x, z] = [along_x, along_z].map(|[before, behind]| (behind - before) / run);
         let square = x * x + z * z;
+        let up = 1.0 / (1.0 + square).sqrt();
         Self {
             height,
             #[cfg(feature = "png")]
             slope: square.sqrt(),
-            up: 1.0 / (1.0 + square).sqrt(),
+            up,
+            #[cfg(feature = "noise")]
+            material_up: up,
         }
     }
 
@@ -78,7 +86,11 @@ pub(crate) fn fill(
     distances: &mut [f32],
     materials: &mut [u8],
 ) {
-    let columns = columns(field, region);
+    let detail = Detail::of(region);
+    let mut columns = columns(field, region);
+    if !detail.is_finest() && strata.iter().any(|stratum| stratum.steeper_than > 0.0) {
+        give_slopes_of_level_0(field, region, &mut columns);
+    }
     let nx = region.size[0] as usize;
     for ([y, z], distances, materials) in rows(region, distances, materials) {
         let y = (f64::from(region.min[1]) + f64::from(y)) * region.spacing;
@@ -87,11 +99,39 @@ pub(crate) fn fill(
             let above = y - column.height;
             *distance = (column.distance(above) / region.spacing) as f32;
             if above < 0.0 {
-                *material = material_at(strata, -above, y, column.slope);
+                let raised = detail.raised(-above, deepest(detail, column.up));
+                *material = material_at(strata, -above - raised, y + raised * column.up * column.up, column.slope);
             }
         }
     }
 }
+
+#[cfg(feature = "png")]
+/// Replaces the slopes of a region's columns by those of level 0. Coarse levels miss what is steep in the small, and
+/// would give it another material.
+fn give_slopes_of_level_0(field: &impl HeightField, region: &SourceRegion, columns: &mut [Column]) {
+    let detail = Detail::of(region);
+    let nx = region.size[0] as usize;
+    for (index, column) in columns.iter_mut().enumerate() {
+        let at = |axis: usize, index: usize, steps: f64| {
+            ((f64::from(region.min[axis]) + index as f64) * detail.voxels() + steps) * detail.voxel()
+        };
+        let height = |along_x: f64, along_z: f64| field.height(at(0, index % nx, along_x), at(2, index / nx, along_z));
+        let [along_x, along_z] = [[height(-1.0, 0.0), height(1.0, 0.0)], [height(0.0, -1.0), height(0.0, 1.0)]];
+        column.slope = Column::new(column.height, along_x, along_z, 2.0 * detail.voxel()).slope;
+    }
+}
+
+#[cfg(feature = "png")]
+/// The depth, along y, of the deepest inside ends of edges, below ground whose normal has this y part. It is a spacing
+/// along the normal. It is limited, so that deep ground is known without its slope.
+fn deepest(detail: Detail, up: f64) -> f64 {
+    detail.spacing() / up.max(FLATTEST)
+}
+
+#[cfg(feature = "png")]
+/// The least y part of normals in [`deepest`]: that of a slope of nearly 4.
+const FLATTEST: f64 = 0.25;
 
 #[cfg(feature = "png")]
 /// [`Source::bound`](marchless::Source::bound) of a height field.
@@ -102,10 +142,18 @@ pub(crate) fn bound(field: &impl HeightField, strata: &[Stratum], region: &Sourc
     if bottom > highest + margin {
         Bound::Outside
     } else if top < lowest - margin
-        && let Some(material) = material_within(strata, [lowest - top, highest - bottom], [bottom, top])
+        && let Some(material) = certain_material(strata, region, [lowest - top, highest - bottom], [bottom, top])
     {
         Bound::Inside { material }
     } else {
         Bound::Mixed
     }
+}
+
+#[cfg(feature = "png")]
+/// The one material of all ground between two depths and two heights of a region; `None` if it may differ.
+fn certain_material(strata: &[Stratum], region: &SourceRegion, depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
+    let detail = Detail::of(region);
+    let raised = [detail.raised(depth[0], deepest(detail, 0.0)), detail.raised(depth[1], deepest(detail, 1.0))];
+    material_within(strata, [depth[0] - raised[0], depth[1] - raised[1]], [height[0], height[1] + detail.most_raised()])
 }

@@ -24,6 +24,7 @@ use self::body::{Body, ColumnWindow, QueryBox};
 use self::field::FieldPoints;
 use self::material::Rules;
 use self::parts::{Line, PreparedBody, Row};
+use super::detail::Detail;
 use super::height_field::Column;
 use super::interval::Interval;
 use super::noise::default_strata;
@@ -106,13 +107,14 @@ impl Landscape {
         self.compiled.noise_calls.load(Ordering::Relaxed)
     }
 
-    /// The height of the landscape's first ground at a position; `None` for a landscape without ground. Units: world.
+    /// The height of the landscape's first ground at a position, in full detail; `None` for a landscape without ground.
+    /// Units: world.
     pub fn height(&self, x: f64, z: f64) -> Option<f64> {
         let mut calls = 0;
         let grounds = self.compiled.body.grounds();
         let field = grounds.first()?.columns.field();
         let mut height = [0.0];
-        field.values(&FieldPoints::Grid { xs: &[x], zs: &[z] }, &mut height, &mut calls);
+        field.values(Detail::FINEST, &FieldPoints::Grid { xs: &[x], zs: &[z] }, &mut height, &mut calls);
         self.count(calls);
         Some(height[0])
     }
@@ -124,10 +126,12 @@ impl Landscape {
     /// Converts a region to world units, for evaluation and bounds.
     fn region<'a>(&self, region: &SourceRegion, columns: Option<ColumnWindow<'a>>) -> QueryBox<'a> {
         let sides = world_box(region).map(|[low, high]| Interval { low, high });
-        let reach = self.compiled.rules.deepest.max(BOUND_MARGIN * region.spacing);
+        let detail = Detail::of(region);
+        let reach = detail.deepened(self.compiled.rules.deepest).max(BOUND_MARGIN * region.spacing);
         QueryBox {
             sides,
             spacing: region.spacing,
+            detail,
             reach,
             margin: BOUND_MARGIN * region.spacing,
             strictly: false,
@@ -135,9 +139,10 @@ impl Landscape {
         }
     }
 
-    /// The columns of each ground in a region, by the ground's number.
-    fn columns(&self, region: &SourceRegion, calls: &mut u64) -> Vec<Vec<Column>> {
-        self.compiled.body.grounds().into_iter().map(|ground| ground.columns.of(region, calls)).collect()
+    /// The columns of each ground in a region, by the ground's number. `with_slopes`: whether for materials, too.
+    fn columns(&self, region: &SourceRegion, with_slopes: bool, calls: &mut u64) -> Vec<Vec<Column>> {
+        let grounds = self.compiled.body.grounds().into_iter();
+        grounds.map(|ground| ground.columns.of(region, with_slopes, calls)).collect()
     }
 
     /// The bound of a region. `noisily`: whether to evaluate noise for it.
@@ -150,7 +155,10 @@ impl Landscape {
             let depth = [-known.distance.high, -known.distance.low];
             known.matter.and_then(|matter| match u8::try_from(matter) {
                 Ok(material) => Some(material),
-                Err(_) => self.compiled.rules.material_within(depth, [region.sides[1].low, region.sides[1].high]),
+                Err(_) => {
+                    let heights = [region.sides[1].low, region.sides[1].high];
+                    self.compiled.rules.material_within(region.detail, depth, heights)
+                }
             })
         } else {
             None
@@ -177,7 +185,7 @@ impl Source for Landscape {
             return;
         }
         let mut calls = 0;
-        let columns = self.columns(samples, &mut calls);
+        let columns = self.columns(samples, self.compiled.rules.by_slope, &mut calls);
         let width = samples.size[0] as usize;
         let part = [0..width, 0..samples.size[2] as usize];
         let region = self.region(samples, Some(ColumnWindow { columns: &columns, width, part }));
@@ -185,7 +193,7 @@ impl Source for Landscape {
         let xs: Vec<f64> = (0..samples.size[0]).map(|x| samples.position([x, 0, 0])[0]).collect();
         let mut row = Row::new(width);
         let spacing = samples.spacing as f32;
-        let mut rules = self.compiled.rules.for_rows(&xs);
+        let mut rules = self.compiled.rules.for_rows(region.detail, &xs);
         for (index, distances, materials) in rows(samples, distances, materials) {
             let [_, y, z] = samples.position([0, index[0], index[1]]);
             let line =
@@ -217,7 +225,7 @@ impl Source for Landscape {
         let mut calls = 0;
         let mut bound = self.certain(&region, false, &mut calls);
         if bound == Bound::Mixed && !samples.is_empty() && most <= MOST_COLUMNS {
-            let columns = self.columns(samples, &mut calls);
+            let columns = self.columns(samples, false, &mut calls);
             let part = [0..samples.size[0] as usize, 0..samples.size[2] as usize];
             let columns = Some(ColumnWindow { columns: &columns, width: samples.size[0] as usize, part });
             bound = self.certain(&QueryBox { columns, ..region }, true, &mut calls);

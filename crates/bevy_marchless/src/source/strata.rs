@@ -7,6 +7,9 @@ use bevy_reflect::std_traits::ReflectDefault;
 ///
 /// A rule holds if all of its conditions hold. The first rule that holds gives the material; if none holds, it is 0.
 ///
+/// At coarse levels of detail, depths and heights are counted from the surface as samples of level 0 would lie, and
+/// slopes are those of level 0.
+///
 /// ```
 /// use bevy_marchless::source::Stratum;
 ///
@@ -41,6 +44,7 @@ impl Default for Stratum {
     }
 }
 
+#[cfg(any(feature = "png", test))]
 impl Stratum {
     pub(crate) fn holds(&self, depth: f64, height: f64, slope: f64) -> bool {
         depth >= self.below_depth && height >= self.above_height && slope >= self.steeper_than

@@ -58,6 +58,8 @@ mod source_calls;
 mod source_height_map;
 #[cfg(feature = "noise")]
 mod source_landscape;
+#[cfg(all(feature = "noise", feature = "png"))]
+mod source_levels;
 mod stream;
 mod stream_bad_input;
 mod stream_corners;

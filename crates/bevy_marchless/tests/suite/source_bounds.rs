@@ -16,7 +16,7 @@ fn filled(source: &dyn Source, region: &SourceRegion) -> (Vec<f32>, Vec<u8>) {
 fn region() -> impl Strategy<Value = SourceRegion> {
     let min = [-40..40, -20..90, -40..40]
         .map(|range| prop::num::i32::ANY.prop_map(move |v| range.start + v.rem_euclid(range.end - range.start)));
-    (min, [1u32..12, 1..12, 1..12], 0u8..3, prop_oneof![Just(1.0), Just(0.3), Just(2.5)])
+    (min, [1u32..12, 1..12, 1..12], 0u8..8, prop_oneof![Just(1.0), Just(0.3), Just(2.5)])
         .prop_map(|(min, size, level, spacing)| SourceRegion { min, size, level, spacing })
 }
 

@@ -106,7 +106,8 @@ fn settings() -> impl Strategy<Value = LandscapeSettings> {
 fn region() -> impl Strategy<Value = SourceRegion> {
     let middle = || prop_oneof![3 => Just(0), 1 => Just(10_000_000), 1 => Just(-10_000_000)];
     let min = (middle(), middle(), [-40..40, -40..90, -40..40]).prop_map(|(x, z, [dx, dy, dz])| [x + dx, dy, z + dz]);
-    (min, [1u32..20, 1..20, 1..20], 0u8..2, prop_oneof![Just(1.0), Just(0.3), Just(2.5)]).prop_map(
+    let level = prop_oneof![Just(0u8), 0u8..7];
+    (min, [1u32..20, 1..20, 1..20], level, prop_oneof![Just(1.0), Just(0.3), Just(2.5)]).prop_map(
         |(min, size, level, spacing)| SourceRegion { min, size, level, spacing: spacing * f64::from(1 << level) },
     )
 }

@@ -7,6 +7,7 @@ use bevy_math::DVec3;
 use super::columns::Columns;
 use super::field::Field;
 use super::{Caves, Solid, Tunnels};
+use crate::source::detail::Detail;
 use crate::source::height_field::Column;
 use crate::source::interval::Interval;
 use crate::source::octaves::Octaves;
@@ -52,7 +53,7 @@ pub(super) enum NoiseKind {
     /// Points where the noise is above the threshold.
     Caves { noise: Octaves, threshold: f64 },
     /// Points where the length of the vector of both noises is below the width.
-    Tunnels { noises: Box<[Octaves; 2]>, width: f64 },
+    Tunnels { noises: Box<[Octaves; 2]>, width: f64, radius: f64 },
 }
 
 /// The difference between the seeds of both noises of tunnels.
@@ -67,6 +68,8 @@ pub(super) struct QueryBox<'a> {
     pub(super) sides: [Interval; 3],
     /// World units between samples.
     pub(super) spacing: f64,
+    /// What the samples' level of detail shows.
+    pub(super) detail: Detail,
     /// The distance from the surface beyond which exact distances do not matter. Units: world.
     pub(super) reach: f64,
     /// The distance that samples must have from the surface for a bound to be certain. Units: world.
@@ -232,8 +235,11 @@ impl Ground {
     fn known(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> KnownDistance {
         let [x, y, z] = region.sides;
         let Some(window) = &region.columns else {
-            let heights =
-                if noisily { self.columns.field().within(x, z, calls).within(self.range) } else { self.range };
+            let heights = if noisily {
+                self.columns.field().within(region.detail, x, z, calls).within(self.range)
+            } else {
+                self.range
+            };
             let above = y.plus(heights.negated());
             let flat = 1.0 / (1.0 + self.steepest * self.steepest).sqrt();
             // On a slope, distances are smaller than heights above it; their sign is the same.
@@ -269,12 +275,40 @@ impl Noise {
         let noises = [&tunnels.noise, &other].map(Octaves::new);
         let typical = noises[0].typical_gradient();
         let steepest = core::f64::consts::SQRT_2 * noises[0].lipschitz_3d();
-        let kind = NoiseKind::Tunnels { noises: Box::new(noises), width: tunnels.radius * typical };
+        let radius = tunnels.radius;
+        let kind = NoiseKind::Tunnels { noises: Box::new(noises), width: radius * typical, radius };
         Self { kind, lattice: tunnels.lattice, flattest: typical / 4.0, steepest }
+    }
+
+    /// The distance of all points, if the samples of a level of detail show none of the noise.
+    ///
+    /// Caves are then everywhere or nowhere, and tunnels of less than two spacings are nowhere: what is left of a thin
+    /// tunnel would be a row of bubbles. The noise of other tunnels is left as it is, since their walls follow its
+    /// zeros, and is hardly ever finer than they are wide.
+    pub(super) fn constant(&self, detail: Detail) -> Option<f64> {
+        match &self.kind {
+            NoiseKind::Caves { noise, threshold } => {
+                let value = noise.constant_3d(detail)?;
+                Some(if value > *threshold { f64::NEG_INFINITY } else { f64::INFINITY })
+            }
+            NoiseKind::Tunnels { radius, .. } => (!detail.shows(2.0 * radius)).then_some(f64::INFINITY),
+        }
+    }
+
+    /// What a level of detail shows of the noise.
+    pub(super) fn shown(&self, detail: Detail) -> Detail {
+        match &self.kind {
+            NoiseKind::Caves { .. } => detail,
+            NoiseKind::Tunnels { .. } => Detail::FINEST,
+        }
     }
 
     /// The interval of all distances in a box.
     fn distance(&self, region: &QueryBox, noisily: bool, calls: &mut u64) -> Interval {
+        if let Some(distance) = self.constant(region.detail) {
+            return Interval::exactly(distance);
+        }
+        let detail = self.shown(region.detail);
         let (center, radius) = region.ball();
         // Interpolated noise depends on noise up to a cell of the lattice away.
         let more = if self.lattice > 1 { f64::from(self.lattice) * region.spacing * 3.0_f64.sqrt() } else { 0.0 };
@@ -282,13 +316,13 @@ impl Noise {
             if !noisily {
                 return octaves.range();
             }
-            let (interval, more) = octaves.around(center.to_array(), radius + more);
+            let (interval, more) = octaves.around(detail, center.to_array(), radius + more);
             *calls += more;
             interval
         };
         let above = match &self.kind {
             NoiseKind::Caves { noise, threshold } => Interval::exactly(*threshold).plus(around(noise).negated()),
-            NoiseKind::Tunnels { noises, width } => {
+            NoiseKind::Tunnels { noises, width, .. } => {
                 let [a, b] = [&noises[0], &noises[1]].map(|noise| around(noise).abs());
                 let length = Interval { low: a.low.hypot(b.low), high: f64::INFINITY };
                 length.plus(Interval::exactly(-width))

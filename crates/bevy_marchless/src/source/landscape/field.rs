@@ -4,10 +4,12 @@ use bevy_math::DVec2;
 
 use super::Layer;
 use crate::source::Fractal;
+use crate::source::detail::Detail;
 use crate::source::interval::Interval;
 use crate::source::octaves::Octaves;
 
-/// A [`Layer`] prepared for evaluation. Functions add the number of noise evaluations to `calls`.
+/// A [`Layer`] prepared for evaluation. Functions add the number of noise evaluations to `calls`, and leave out the
+/// noise that a level of detail does not show.
 #[derive(Clone)]
 pub(super) enum Field {
     Constant(f64),
@@ -62,13 +64,13 @@ impl Field {
     }
 
     /// Writes the values at `places`, one for each.
-    pub(super) fn values(&self, places: &FieldPoints, values: &mut [f64], calls: &mut u64) {
+    pub(super) fn values(&self, detail: Detail, places: &FieldPoints, values: &mut [f64], calls: &mut u64) {
         let fold = |fields: &[Self], join: fn(f64, f64) -> f64, none: f64, values: &mut [f64], calls: &mut u64| {
             let Some((first, others)) = fields.split_first() else { return values.fill(none) };
-            first.values(places, values, calls);
+            first.values(detail, places, values, calls);
             let mut next = vec![0.0; values.len()];
             for other in others {
-                other.values(places, &mut next, calls);
+                other.values(detail, places, &mut next, calls);
                 for (value, next) in values.iter_mut().zip(&next) {
                     *value = join(*value, *next);
                 }
@@ -77,7 +79,7 @@ impl Field {
         match self {
             Self::Constant(value) => values.fill(*value),
             Self::Noise { octaves, amplitude } => {
-                places.noise(octaves, values, calls);
+                places.noise(detail, octaves, values, calls);
                 values.iter_mut().for_each(|value| *value *= amplitude);
             }
             Self::Sum(fields) => fold(fields, |a, b| a + b, 0.0, values, calls),
@@ -85,33 +87,33 @@ impl Field {
             Self::Minimum(fields) => fold(fields, f64::min, 0.0, values, calls),
             Self::Maximum(fields) => fold(fields, f64::max, 0.0, values, calls),
             Self::Clamp { of, .. } | Self::Terraces { of, .. } | Self::Curve { of, .. } => {
-                of.values(places, values, calls);
+                of.values(detail, places, values, calls);
                 values.iter_mut().for_each(|value| *value = self.bend(*value));
             }
             Self::Warp { of, along_x, along_z, reach } => {
                 let [mut xs, mut zs] = [(); 2].map(|()| vec![0.0; values.len()]);
-                places.noise(along_x, &mut xs, calls);
-                places.noise(along_z, &mut zs, calls);
+                places.noise(detail, along_x, &mut xs, calls);
+                places.noise(detail, along_z, &mut zs, calls);
                 for ((x, z), [from_x, from_z]) in xs.iter_mut().zip(&mut zs).zip(places.iter()) {
                     *x = from_x + reach * *x;
                     *z = from_z + reach * *z;
                 }
-                of.values(&FieldPoints::Scattered { xs: &xs, zs: &zs }, values, calls);
+                of.values(detail, &FieldPoints::Scattered { xs: &xs, zs: &zs }, values, calls);
             }
         }
     }
 
     /// The interval of all values in a rectangle with the sides `x` and `z`. Evaluates noise only in its middle.
-    pub(super) fn within(&self, x: Interval, z: Interval, calls: &mut u64) -> Interval {
+    pub(super) fn within(&self, detail: Detail, x: Interval, z: Interval, calls: &mut u64) -> Interval {
         self.interval(&mut |octaves, [along_x, along_z]| {
             let [x, z] = [x.plus(along_x), z.plus(along_z)];
-            let (interval, more) = octaves.around([x.middle(), z.middle()], x.half().hypot(z.half()));
+            let (interval, more) = octaves.around(detail, [x.middle(), z.middle()], x.half().hypot(z.half()));
             *calls += more;
             interval
         })
     }
 
-    /// The interval of all values of the field.
+    /// The interval of all values of the field, at every level of detail.
     pub(super) fn range(&self) -> Interval {
         self.interval(&mut |octaves, _| octaves.range())
     }
@@ -146,7 +148,7 @@ impl Field {
         .widened(1e-12)
     }
 
-    /// The greatest change of the field per world unit; infinite if it is not known.
+    /// The greatest change of the field per world unit, at every level of detail; infinite if it is not known.
     pub(super) fn lipschitz(&self) -> f64 {
         let most = |fields: &[Self]| fields.iter().map(Self::lipschitz).fold(0.0, f64::max);
         match self {
@@ -218,14 +220,14 @@ impl FieldPoints<'_> {
         }
     }
 
-    fn noise(&self, octaves: &Octaves, values: &mut [f64], calls: &mut u64) {
+    fn noise(&self, detail: Detail, octaves: &Octaves, values: &mut [f64], calls: &mut u64) {
         match *self {
             Self::Grid { xs, zs } => {
                 for (z, values) in zs.iter().zip(values.chunks_exact_mut(xs.len().max(1))) {
-                    *calls += octaves.row_2d(xs, *z, values);
+                    *calls += octaves.row_2d(detail, xs, *z, values);
                 }
             }
-            Self::Scattered { xs, zs } => *calls += octaves.points_2d(xs, zs, values),
+            Self::Scattered { xs, zs } => *calls += octaves.points_2d(detail, xs, zs, values),
         }
     }
 }

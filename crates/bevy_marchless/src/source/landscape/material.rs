@@ -5,6 +5,7 @@ use bevy_reflect::std_traits::ReflectDefault;
 
 use super::body::BY_RULES;
 use super::parts::{Line, Row};
+use crate::source::detail::Detail;
 use crate::source::octaves::Octaves;
 use crate::source::perlin::NoiseRow;
 use crate::source::{Fractal, SourceError, Stratum, check};
@@ -85,6 +86,8 @@ pub(super) struct Rules {
     rules: Vec<Rule>,
     /// The greatest depth at which materials change. Units: world.
     pub(super) deepest: f64,
+    /// Whether a rule goes by the slope.
+    pub(super) by_slope: bool,
 }
 
 struct Rule {
@@ -101,36 +104,44 @@ impl Rules {
             stratum: *stratum,
             patches: patches.as_ref().map(|patches| (Octaves::new(&patches.noise), patches.above)),
         };
-        Self { deepest: depths.fold(0.0, f64::max), rules: rules.iter().map(rule).collect() }
+        let by_slope = rules.iter().any(|rule| rule.stratum.steeper_than > 0.0);
+        Self { deepest: depths.fold(0.0, f64::max), by_slope, rules: rules.iter().map(rule).collect() }
     }
 
-    /// The one material of all ground between two depths and two heights; `None` if it may differ.
-    pub(super) fn material_within(&self, depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
+    /// The one material of all ground between two depths and two heights, in samples of a level of detail; `None` if it
+    /// may differ.
+    pub(super) fn material_within(&self, detail: Detail, depth: [f64; 2], height: [f64; 2]) -> Option<u8> {
         let mut possible = None;
         for Rule { stratum, patches } in &self.rules {
-            if !stratum.holds(depth[1], height[1], f64::INFINITY) {
+            // Written as in `RowRules::give`, so that both round alike.
+            let below = detail.deepened(stratum.below_depth);
+            let [lift_at_bottom, lift_at_top] = height.map(|height| stratum.above_height - height);
+            let (most_steep, level) = (f64::INFINITY >= stratum.steeper_than, 0.0 >= stratum.steeper_than);
+            if !(depth[1] >= below && most_steep) || lift_at_top > detail.most_raised() {
                 continue;
             }
             if possible.is_some_and(|material| material != stratum.material) {
                 return None;
             }
             possible = Some(stratum.material);
-            if patches.is_none() && stratum.holds(depth[0], height[0], 0.0) {
+            let high_enough = lift_at_bottom <= -detail.most_raised();
+            if patches.is_none() && depth[0] >= below && level && high_enough {
                 return possible;
             }
         }
         (possible.unwrap_or(0) == 0).then_some(0)
     }
 
-    /// The rules for rows with these coordinates along x. Units: world.
-    pub(super) fn for_rows<'a>(&'a self, xs: &'a [f64]) -> RowRules<'a> {
-        RowRules { rules: &self.rules, xs, chosen: vec![AIR; xs.len()], noise: NoiseRow::default() }
+    /// The rules for rows with these coordinates along x, in samples of a level of detail. Units: world.
+    pub(super) fn for_rows<'a>(&'a self, detail: Detail, xs: &'a [f64]) -> RowRules<'a> {
+        RowRules { rules: &self.rules, detail, xs, chosen: vec![AIR; xs.len()], noise: NoiseRow::default() }
     }
 }
 
 /// [`Rules`] for rows with the same coordinates along x.
 pub(super) struct RowRules<'a> {
     rules: &'a [Rule],
+    detail: Detail,
     xs: &'a [f64],
     /// Each sample's material, [`UNDECIDED`] or [`AIR`].
     chosen: Vec<i32>,
@@ -148,6 +159,7 @@ impl RowRules<'_> {
     pub(super) fn give(&mut self, line: &Line, row: &Row, materials: &mut [u8], calls: &mut u64) {
         // Loops over numbers of one width, without branches, so that the compiler vectorises them.
         let len = materials.len();
+        let (within, share) = (self.detail.spacing() as f32, self.detail.raised_share() as f32);
         let (distances, ups, matters) = (&row.distance[..len], &row.up[..len], &row.matter[..len]);
         let chosen = &mut self.chosen[..len];
         for index in 0..len {
@@ -158,19 +170,25 @@ impl RowRules<'_> {
             if !chosen.contains(&UNDECIDED) {
                 break;
             }
-            if line.y < stratum.above_height {
+            // A sample counts as higher than it lies, by as much as it counts as less deep, along the normal.
+            let (lift, most_raised) = (stratum.above_height - line.y, self.detail.most_raised());
+            if lift > most_raised {
                 continue;
             }
+            let is_high = lift <= -most_raised || lift.is_nan();
+            let lift = lift as f32;
             // The slope condition as a condition on the y part of the surface's normal.
             let steeper = stratum.steeper_than;
             let most_up = if steeper <= 0.0 { f32::INFINITY } else { (1.0 / (1.0 + steeper * steeper).sqrt()) as f32 };
-            let highest = -stratum.below_depth as f32;
+            let highest = -self.detail.deepened(stratum.below_depth) as f32;
             let material = i32::from(stratum.material);
-            let holds =
-                |chosen: i32, distance: f32, up: f32| (chosen == UNDECIDED) & (distance <= highest) & (up <= most_up);
+            let holds = |chosen: i32, distance: f32, up: f32| {
+                let lifted = up * (-distance).min(within) * share;
+                (chosen == UNDECIDED) & (distance <= highest) & (up <= most_up) & (is_high | (lifted >= lift))
+            };
             if let Some((octaves, above)) = patches {
                 if (0..len).any(|index| holds(chosen[index], distances[index], ups[index])) {
-                    *calls += octaves.row_3d(self.xs, line.y, line.z, &mut self.noise);
+                    *calls += octaves.row_3d(Detail::FINEST, self.xs, line.y, line.z, &mut self.noise);
                     for (index, chosen) in chosen.iter_mut().enumerate() {
                         if holds(*chosen, distances[index], ups[index]) && f64::from(self.noise.value[index]) > *above {
                             *chosen = material;

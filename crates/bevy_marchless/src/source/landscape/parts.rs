@@ -7,6 +7,7 @@ use marchless::SourceRegion;
 
 use super::body::{BY_RULES, Body, Noise, NoiseKind, QueryBox};
 use crate::source::Sdf;
+use crate::source::detail::Detail;
 use crate::source::height_field::Column;
 use crate::source::octaves::Octaves;
 use crate::source::perlin::NoiseRow;
@@ -16,7 +17,8 @@ use crate::source::perlin::NoiseRow;
 pub(super) struct Row {
     /// The signed distance of each sample. Units: world.
     pub(super) distance: Vec<f32>,
-    /// The y part of the surface's normal at each sample: 1 on a floor, 0 at a wall, −1 under a ceiling.
+    /// The y part of the surface's normal at each sample, as materials see it: 1 on a floor, 0 at a wall, −1 under a
+    /// ceiling.
     pub(super) up: Vec<f32>,
     /// The material of each sample, or [`BY_RULES`].
     pub(super) matter: Vec<u16>,
@@ -38,12 +40,20 @@ pub(super) struct Line<'a> {
 
 /// A [`Body`] prepared for one region, without the parts that cannot matter there.
 pub(super) enum PreparedBody<'a> {
-    Everything,
+    /// The same distance everywhere: infinite, and −∞ if everything is solid.
+    Constant(f32),
     Ground(&'a [Column]),
     Noise(Box<NoiseSamples<'a>>),
     Shape(Sdf),
-    Union { parts: Vec<PreparedBody<'a>>, row: Row },
-    Cut { parts: Vec<PreparedBody<'a>>, sign: f32, row: Row },
+    Union {
+        parts: Vec<PreparedBody<'a>>,
+        row: Row,
+    },
+    Cut {
+        parts: Vec<PreparedBody<'a>>,
+        sign: f32,
+        row: Row,
+    },
 }
 
 impl Row {
@@ -64,9 +74,12 @@ impl<'a> PreparedBody<'a> {
     pub(super) fn new(body: &'a Body, samples: &SourceRegion, region: &QueryBox, columns: &'a [Vec<Column>]) -> Self {
         let row = || Row::new(samples.size[0] as usize);
         match body {
-            Body::Everything => Self::Everything,
+            Body::Everything => Self::Constant(f32::NEG_INFINITY),
             Body::Ground(ground) => Self::Ground(&columns[ground.number]),
-            Body::Noise(noise) => Self::Noise(Box::new(NoiseSamples::new(noise, samples))),
+            Body::Noise(noise) => match noise.constant(region.detail) {
+                Some(distance) => Self::Constant(distance as f32),
+                None => Self::Noise(Box::new(NoiseSamples::new(noise, samples, region.detail))),
+            },
             Body::Shape(shape) => {
                 let (center, radius) = region.ball();
                 Self::Shape(shape.pruned(center, radius + samples.spacing))
@@ -93,14 +106,14 @@ impl<'a> PreparedBody<'a> {
     /// Loops over samples are written out, over slices of one length, so that the compiler vectorises them.
     pub(super) fn evaluate(&mut self, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
         match self {
-            Self::Everything => out.fill(range, f32::NEG_INFINITY, 1.0),
+            Self::Constant(distance) => out.fill(range, *distance, 1.0),
             Self::Ground(columns) => {
                 let columns = &columns[line.xs.len() * line.index[1] as usize..][range.clone()];
                 out.matter[range.clone()].fill(BY_RULES);
                 let (distances, ups) = (&mut out.distance[range.clone()], &mut out.up[range]);
                 for ((column, distance), up) in columns.iter().zip(distances).zip(ups) {
                     *distance = column.distance(line.y - column.height) as f32;
-                    *up = column.up as f32;
+                    *up = column.material_up as f32;
                 }
             }
             Self::Noise(samples) => samples.evaluate(line, range, out, calls),
@@ -156,6 +169,7 @@ impl<'a> PreparedBody<'a> {
 /// Samples of 3-D noise, evaluated at each point of a region or interpolated between every n-th point.
 pub(super) struct NoiseSamples<'a> {
     noise: &'a Noise,
+    detail: Detail,
     /// The noise at the samples of a row.
     rows: [NoiseRow; 2],
     /// The excess of the first noise over the values that tunnels allow; negative where tunnels are possible.
@@ -164,9 +178,9 @@ pub(super) struct NoiseSamples<'a> {
 }
 
 impl<'a> NoiseSamples<'a> {
-    fn new(noise: &'a Noise, region: &SourceRegion) -> Self {
+    fn new(noise: &'a Noise, region: &SourceRegion, detail: Detail) -> Self {
         let lattice = (noise.lattice > 1).then(|| NoiseLattice::new(noise.lattice, region));
-        Self { noise, rows: Default::default(), too_far: Vec::new(), lattice }
+        Self { noise, detail: noise.shown(detail), rows: Default::default(), too_far: Vec::new(), lattice }
     }
 
     fn evaluate(&mut self, line: &Line, range: Range<usize>, out: &mut Row, calls: &mut u64) {
@@ -185,8 +199,8 @@ impl<'a> NoiseSamples<'a> {
         };
         let row = &mut self.rows[which];
         *calls += match &mut self.lattice {
-            None => octaves.row_3d(&line.xs[range], line.y, line.z, row),
-            Some(lattice) => lattice.row(which, octaves, line.index, range, row),
+            None => octaves.row_3d(self.detail, &line.xs[range], line.y, line.z, row),
+            Some(lattice) => lattice.row(which, (octaves, self.detail), line.index, range, row),
         };
     }
 
@@ -285,7 +299,14 @@ impl NoiseLattice {
 
     /// Interpolates the row with this local y and z, and returns the number of noise evaluations. A value depends only
     /// on its position, whatever the region.
-    fn row(&mut self, which: usize, octaves: &Octaves, line: [u32; 2], range: Range<usize>, row: &mut NoiseRow) -> u64 {
+    fn row(
+        &mut self,
+        which: usize,
+        (octaves, detail): (&Octaves, Detail),
+        line: [u32; 2],
+        range: Range<usize>,
+        row: &mut NoiseRow,
+    ) -> u64 {
         let mut calls = 0;
         let [(y, share_y), (z, share_z)] = [self.places[1][line[0] as usize], self.places[2][line[1] as usize]];
         let places = &self.places[0][range];
@@ -303,7 +324,7 @@ impl NoiseLattice {
                 let nodes = self.rows[which][index].get_or_insert_with(|| {
                     let at = |axis: usize, node: usize| (self.first[axis] + node as i64) as f64 * self.step;
                     let mut nodes = NoiseRow::default();
-                    calls += octaves.row_3d(&self.xs, at(1, y + step_y), at(2, z + step_z), &mut nodes);
+                    calls += octaves.row_3d(detail, &self.xs, at(1, y + step_y), at(2, z + step_z), &mut nodes);
                     nodes
                 });
                 let NoiseRow { value, gradient: [by_x, by_y, by_z], .. } = nodes;
