@@ -82,7 +82,7 @@ impl Default for LevelSettings {
 /// let cover = LevelCover::new(&[viewer], &LevelSettings::default(), None, is_empty)?;
 ///
 /// let below = cover.leaf_at([0, -1, 0]).expect("it is in view");
-/// let far = cover.leaf_at([100, -1, 0]).expect("it is in view");
+/// let far = cover.leaf_at([-100, -1, 0]).expect("it is in view");
 /// assert_eq!((below.level, far.level), (0, 5));
 /// assert!(cover.finer_neighbours(far).is_empty());
 /// # Ok::<(), marchless::LevelError>(())

@@ -43,9 +43,9 @@ impl Source for Bumps {
     fn bound(&self, region: &SourceRegion) -> Bound {
         let ends = [region.position([0; 3]), region.position(region.size.map(|size| size - 1))];
         let [mut nearest, mut farthest] = [0.0f64; 2];
-        for axis in 0..3 {
-            let [low, high] = [0, 1].map(|end: usize| ends[end][axis] - self.middle[axis]);
-            let near = if low > 0.0 { low } else { (-high).max(0.0) };
+        let [lows, highs] = ends.map(|end| [0, 1, 2].map(|axis| end[axis] - self.middle[axis]));
+        for (low, high) in lows.into_iter().zip(highs) {
+            let near = low.max(-high).max(0.0);
             let far = low.abs().max(high.abs());
             (nearest, farthest) = (nearest + near * near, farthest + far * far);
         }
