@@ -84,7 +84,8 @@ impl Default for LevelSettings {
 /// let below = cover.leaf_at([0, -1, 0]).expect("it is in view");
 /// let far = cover.leaf_at([-100, -1, 0]).expect("it is in view");
 /// assert_eq!((below.level, far.level), (0, 5));
-/// assert!(cover.finer_neighbours(far).is_empty());
+/// // Nearer to the viewer, its neighbour is finer.
+/// assert!(cover.finer_neighbours(far).contains([1, 0, 0]));
 /// # Ok::<(), marchless::LevelError>(())
 /// ```
 #[derive(Clone, Debug)]
