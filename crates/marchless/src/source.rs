@@ -97,8 +97,8 @@ pub enum Bound {
 /// # Levels of detail
 /// A region of level `k` has every 2^k-th lattice point of level 0. A source may ignore the level: distances are in
 /// voxels of the level in any case, and the same formula serves all levels. But waves shorter than two spacings look
-/// random, and change from level to level; and the samples next to the surface, which give its vertices their materials,
-/// lie up to 2^k voxels below it. So a good source does three things at levels other than 0:
+/// random, and change from level to level; and the samples next to the surface, which give its vertices their
+/// materials, lie up to 2^k voxels below it. So a good source does three things at levels other than 0:
 /// - it leaves out waves shorter than two spacings, and fades those that are little longer;
 /// - it gives samples within one spacing of the surface the material that is seen from above;
 /// - it bounds a region of a level as it fills that level.
@@ -111,8 +111,8 @@ pub trait Source: Any + Send + Sync {
     /// divided by [`SourceRegion::spacing`]); NaN counts as outside. `materials`: the same shape, all 0 when called.
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]);
 
-    /// A quick bound of all points of `region`, at its level. Any answer but [`Bound::Mixed`] spares sampling them, so this pays off
-    /// if it costs less than a few samples. A wrong answer leaves holes. The default is [`Bound::Mixed`].
+    /// A quick bound of all points of `region`, at its level. Any answer but [`Bound::Mixed`] spares sampling them, so
+    /// this pays off if it costs less than a few samples. A wrong answer leaves holes. The default is [`Bound::Mixed`].
     fn bound(&self, region: &SourceRegion) -> Bound {
         let _ = region;
         Bound::Mixed

@@ -37,9 +37,9 @@ impl Detail {
     /// Waves of Perlin noise are about two cells long, and two spacings are the shortest wave that samples can show. An
     /// octave that vanished at once would be seen to; so it fades over two levels.
     ///
-    /// Measured in 2-D, with linear interpolation between samples, as a part of the octave's own size: the error is 0.76
-    /// (ridges: 1.05) if a cell is one spacing, 0.36 (0.65) if it is two, 0.10 (0.25) if it is four. Without the octave
-    /// it would be 1. So cells of two to four spacings are better shown, and fading these was refused.
+    /// Measured in 2-D, with linear interpolation between samples, as a part of the octave's own size: the error is
+    /// 0.76 (ridges: 1.05) if a cell is one spacing, 0.36 (0.65) if it is two, 0.10 (0.25) if it is four. Without the
+    /// octave it would be 1. So cells of two to four spacings are better shown, and fading these was refused.
     #[cfg(feature = "noise")]
     pub(crate) fn share(self, frequency: f64) -> f64 {
         if self.is_finest() { 1.0 } else { (1.0 / (frequency * self.spacing) - 1.0).clamp(0.0, 1.0) }
@@ -57,7 +57,8 @@ impl Detail {
     /// A vertex takes its material from the inside end of its edge. At level 0, this end lies 0 to 1 voxel deep, and at
     /// level `k` 0 to 2^k voxels, evenly spread in both cases. So depths within the first 2^k voxels are divided by
     /// 2^k, which gives the depths of level 0; greater ones are less by as much as the first 2^k voxels have lost. (To
-    /// take 2^k − 1 voxels from all depths was refused: layers thinner than a voxel would vanish.) At level 0 this is 0.
+    /// take 2^k − 1 voxels from all depths was refused: layers thinner than a voxel would vanish.) At level 0 this is
+    /// 0.
     #[cfg(any(feature = "png", test))]
     pub(crate) fn raised(self, depth: f64, within: f64) -> f64 {
         depth.min(within) * self.raised_share()
