@@ -1,12 +1,14 @@
-//! What the fuzz targets share: volumes made from a fuzzer's bytes, and meshes down to the last bit; plain grids of
-//! bits.
+//! What the fuzz targets share: volumes and leaves made from a fuzzer's bytes, and meshes down to the last bit; plain
+//! grids of bits.
 
+mod leaves;
 mod plain;
 
 use libfuzzer_sys::arbitrary::{Arbitrary, Result, Unstructured};
 use marchless::{MeshBuffer, MeshSettings, Samples, Shape, Topology, Weight};
 
-pub use plain::{Plain, neighbours};
+pub use leaves::{Block, Leaf, Leaves, SampleBox};
+pub use plain::{Plain, neighbours, points};
 
 /// Every volume is meshed with both.
 pub const TOPOLOGIES: [Topology; 2] = [Topology::Separated, Topology::Trilinear];
@@ -53,11 +55,7 @@ impl<'a, W: FuzzWeight> Arbitrary<'a> for Volume<W> {
         let seed: u32 = u.arbitrary()?;
         let (iso_kind, iso_bits) = (u.int_in_range(0..=3)?, u.arbitrary()?);
 
-        // As many weights as there are bytes for, which is all of a small volume's; they are repeated in the others.
-        let mut given: Vec<W> = vec![weight(u)?];
-        while !u.is_empty() && given.len() < shape.len() {
-            given.push(weight(u)?);
-        }
+        let given: Vec<W> = any_weights(u, shape.len())?;
         let mut random = seed | 1;
         let weights = (0..shape.len())
             .map(|index| {
@@ -66,13 +64,27 @@ impl<'a, W: FuzzWeight> Arbitrary<'a> for Volume<W> {
             })
             .collect();
         let materials = has_materials.then(|| (0..shape.len()).map(|index| index as u8).collect());
-        let isovalue = match iso_kind {
-            0 => 0.0,
-            1 => given[iso_bits as usize % given.len()].to_voxels(),
-            2 => f32::from(iso_bits as i8) / 16.0,
-            _ => f32::from_bits(iso_bits),
-        };
+        let isovalue = any_isovalue(iso_kind, iso_bits, &given);
         Ok(Self { shape, weights, materials, padded, isovalue, normals })
+    }
+}
+
+/// As many weights as there are bytes for, which is all of a small volume's; they are repeated in the others.
+fn any_weights<W: FuzzWeight>(u: &mut Unstructured<'_>, most: usize) -> Result<Vec<W>> {
+    let mut given = vec![weight(u)?];
+    while !u.is_empty() && given.len() < most {
+        given.push(weight(u)?);
+    }
+    Ok(given)
+}
+
+/// Any isovalue; by `kind` zero, one of the weights, a few voxels, or any number.
+fn any_isovalue<W: FuzzWeight>(kind: u8, bits: u32, given: &[W]) -> f32 {
+    match kind % 4 {
+        0 => 0.0,
+        1 => given[bits as usize % given.len()].to_voxels(),
+        2 => f32::from(bits as i8) / 16.0,
+        _ => f32::from_bits(bits),
     }
 }
 

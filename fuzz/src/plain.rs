@@ -76,6 +76,7 @@ pub fn neighbours(connectivity: Connectivity) -> impl Iterator<Item = [i64; 3]> 
         .filter(move |step| (1..=axes).contains(&step.iter().map(|v| v.abs()).sum::<i64>()))
 }
 
-fn points([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+/// All points of a grid, x fastest.
+pub fn points([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
 }
