@@ -28,7 +28,8 @@ use core::time::Duration;
 
 use thiserror::Error;
 
-use crate::lattice::Region;
+use crate::{lattice::Region, sample::Voxel};
+use change::Change;
 pub use edit::{Edit, VolumeByMaterial};
 pub use shape::QuantisedShape;
 use shape::{UNITS, units};
@@ -117,6 +118,11 @@ impl QuantisedStamp {
     /// A box around all lattice points that the stamp may change. It does not depend on their samples.
     pub fn region(&self) -> Region {
         self.shape.region(self.reach() / UNITS)
+    }
+
+    /// The sample that replaces `old` at a lattice point.
+    pub(crate) fn at_point(&self, old: Voxel<i16>, point: [i32; 3]) -> Voxel<i16> {
+        Change::new(self).at_point(old, point)
     }
 
     /// The distance outside its shape up to which the stamp changes weights, in 1/256 voxel.

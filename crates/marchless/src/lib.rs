@@ -42,7 +42,7 @@
 //! # Levels of detail
 //! [`Mesher::mesh_leaf`] meshes a chunk beside neighbours that are one level finer. The seam is part of its mesh, so that
 //! nothing special is needed to draw it. [`LevelCover`] chooses the chunks for the places of viewers, [`LeafBlock`] fills
-//! their samples from a [`Source`], and [`MeshUnion`] judges the meshes of many chunks as one surface.
+//! their samples from a [`Source`] and stamps, and [`MeshUnion`] judges the meshes of many chunks as one surface.
 //!
 //! # Guaranteed
 //! - Within a chunk and across chunks, the surface is closed, 2-manifold, consistently oriented and free of zero-area

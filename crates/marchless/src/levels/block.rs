@@ -5,11 +5,12 @@ use core::ops::Range;
 
 use super::{LeafKey, LevelCover};
 use crate::{
+    brush::QuantisedStamp,
     cell::Face,
     grid::border::Border,
     lattice::{MAX_CHUNK_CELLS, Region, Samples, Shape},
     mesher::{FinerNeighbours, LeafError, LeafSamples},
-    sample::Weight,
+    sample::{Voxel, Weight},
     source::{BOUND_MARGIN, Bound, Source, SourceRegion},
 };
 
@@ -22,6 +23,8 @@ pub struct LevelSource<'a> {
     pub cells: u32,
     /// World units between neighbouring lattice points of level 0.
     pub spacing: f64,
+    /// What has been edited, in order. Stamps far from a leaf do not matter to it, so they may be left out.
+    pub stamps: &'a [QuantisedStamp],
     /// The border of a bounded volume, if it has one: its outermost planes of lattice points, in voxels of level 0, as
     /// [`Grid::planes`](crate::Grid::planes) gives them. What lies beyond is air, and surfaces are closed half a voxel
     /// inside.
@@ -32,7 +35,8 @@ pub struct LevelSource<'a> {
 
 impl LevelSource<'_> {
     /// True if a leaf is certain to have no surface: [`Source::bound`] says so of the leaf and of four lattice points of
-    /// its level around it, and no border cuts solid ground near it. It suits [`LevelCover::new`].
+    /// its level around it, no stamp reaches these points, and no border cuts solid ground there. It suits
+    /// [`LevelCover::new`].
     pub fn is_empty(&self, leaf: LeafKey) -> bool {
         let cells = self.cells();
         let region = SourceRegion {
@@ -42,6 +46,12 @@ impl LevelSource<'_> {
             spacing: self.spacing * f64::from(1u32 << leaf.level.min(31)),
         }
         .grown(BOUND_MARGIN);
+        let scaled = |v: i64| (v << leaf.level).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+        let end = |axis: usize| i64::from(region.min[axis]) + i64::from(region.size[axis]);
+        let points = Region::new(region.min.map(|v| scaled(v.into())), [0, 1, 2].map(|axis| scaled(end(axis))));
+        if self.stamps.iter().any(|stamp| !stamp.region().intersection(&points).is_empty()) {
+            return false;
+        }
         match self.source.bound(&region) {
             Bound::Outside => true,
             Bound::Inside { .. } => {
@@ -61,7 +71,8 @@ impl LevelSource<'_> {
 ///
 /// Samples of all levels are in voxels of level 0: at level `k`, they are the source's answers times 2ᵏ. A lattice point
 /// has one sample, that of the finest leaf that touches it, in the blocks of all leaves. So the meshes of all leaves of a
-/// cover fit, even if the source answers differently at different levels.
+/// cover fit, even if the source answers differently at different levels. A point that stamps change has the sample of
+/// level 0 at every level: the source's answer there, with all stamps applied.
 ///
 /// ```
 /// use marchless::{
@@ -71,7 +82,7 @@ impl LevelSource<'_> {
 /// // A planet of radius 100 around the origin, seen from above its north pole.
 /// let planet = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - 100.0;
 /// let cells = 16;
-/// let level_source = LevelSource { source: &planet, cells, spacing: 1.0, planes: None, isovalue: 0.0 };
+/// let level_source = LevelSource { source: &planet, cells, spacing: 1.0, stamps: &[], planes: None, isovalue: 0.0 };
 /// let settings = LevelSettings { levels: 4, falloff: 2.0, view_distance: 20.0, ..LevelSettings::default() };
 /// // A chunk whose middle is farther from the surface than its corners are from its middle is empty.
 /// let is_empty = |leaf: LeafKey| {
@@ -80,7 +91,7 @@ impl LevelSource<'_> {
 /// };
 /// let cover = LevelCover::new(&[[0.0, 7.0, 0.0]], &settings, None, is_empty)?;
 ///
-/// let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
+/// let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::new(), MeshBuffer::new());
 /// let mut union = MeshUnion::new();
 /// for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
 ///     block.fill(&level_source, &cover, leaf);
@@ -92,16 +103,16 @@ impl LevelSource<'_> {
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct LeafBlock<W = i16> {
-    own: SampleBox<W>,
+pub struct LeafBlock {
+    own: SampleBox,
     /// By face; filled where its neighbour is finer.
-    faces: [SampleBox<W>; 6],
+    faces: [SampleBox; 6],
     finer: FinerNeighbours,
     /// Scratch memory: what a source answers.
     distances: Vec<f32>,
 }
 
-impl<W: Weight> LeafBlock<W> {
+impl LeafBlock {
     /// A block of a single sample of air, until [`LeafBlock::fill`] fills it.
     pub fn new() -> Self {
         let faces = core::array::from_fn(|_| SampleBox::new());
@@ -131,13 +142,13 @@ impl<W: Weight> LeafBlock<W> {
     /// # Errors
     /// [`LeafError::Samples`] before the first [`LeafBlock::fill`], and [`LeafError::PointsDiffer`] if the source gives
     /// two answers for one point.
-    pub fn samples(&self) -> Result<LeafSamples<'_, W>, LeafError> {
+    pub fn samples(&self) -> Result<LeafSamples<'_, i16>, LeafError> {
         let faces = Face::ALL.map(|face| self.finer.contains_face(face).then(|| self.faces[face.index()].samples()));
         LeafSamples::new(self.own.samples().padded(), self.finer, faces)
     }
 }
 
-impl<W: Weight> Default for LeafBlock<W> {
+impl Default for LeafBlock {
     fn default() -> Self {
         Self::new()
     }
@@ -145,18 +156,18 @@ impl<W: Weight> Default for LeafBlock<W> {
 
 /// A box of samples.
 #[derive(Clone, Debug)]
-struct SampleBox<W> {
+struct SampleBox {
     size: [u32; 3],
-    weights: Vec<W>,
+    weights: Vec<i16>,
     materials: Vec<u8>,
 }
 
-impl<W: Weight> SampleBox<W> {
+impl SampleBox {
     fn new() -> Self {
-        Self { size: [1; 3], weights: vec![W::OUTSIDE], materials: vec![0] }
+        Self { size: [1; 3], weights: vec![i16::OUTSIDE], materials: vec![0] }
     }
 
-    fn samples(&self) -> Samples<'_, W> {
+    fn samples(&self) -> Samples<'_, i16> {
         Shape::new(self.size)
             .map(|shape| Samples::new(shape, &self.weights).and_then(|samples| samples.with_materials(&self.materials)))
             .expect("a leaf has few cells")
@@ -180,7 +191,7 @@ struct Filler<'a> {
 
 impl Filler<'_> {
     /// Fills a box of lattice points of a level with what leaves of that level read there.
-    fn fill<W: Weight>(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox<W>) {
+    fn fill(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox) {
         self.sample(level, min, size, out);
         if level == 0 || !self.has_split_places(level, min, size) {
             return;
@@ -214,7 +225,7 @@ impl Filler<'_> {
     }
 
     /// Fills a box with the source's own samples of a level.
-    fn sample<W: Weight>(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox<W>) {
+    fn sample(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox) {
         let (width, len) = (f32::from(1u8 << level), size.iter().map(|&v| v as usize).product());
         let region = SourceRegion { min, size, level, spacing: self.from.spacing * f64::from(width) };
         self.distances.clear();
@@ -224,10 +235,71 @@ impl Filler<'_> {
         out.materials.resize(len, 0);
         self.from.source.fill(&region, self.distances, &mut out.materials);
         out.weights.clear();
-        out.weights.extend(self.distances.iter().map(|distance| W::from_voxels(distance * width)));
+        out.weights.extend(self.distances.iter().map(|distance| i16::from_voxels(distance * width)));
+        self.apply_stamps(&region, out);
         if let Some(planes) = self.from.planes {
             let (weights, materials) = (&mut out.weights, &mut out.materials);
             Border::new(planes).clip_box(level, min, size, self.from.isovalue, weights, materials);
+        }
+    }
+
+    /// Applies the stamps to a box of the source's samples.
+    fn apply_stamps(&mut self, region: &SourceRegion, out: &mut SampleBox) {
+        let step = 1 << region.level;
+        let stamps: Vec<(Region, &QuantisedStamp)> = self.from.stamps.iter().map(|s| (s.region(), s)).collect();
+        let mut touched = Vec::new();
+        for (reach, _) in &stamps {
+            // The points of the level in reach, counted from the box's lowest.
+            let ranges = [0, 1, 2].map(|axis| {
+                let index = |v: i32| (v.saturating_add(step - 1).div_euclid(step)).saturating_sub(region.min[axis]);
+                let size = region.size[axis] as i32;
+                index(reach.min[axis]).clamp(0, size) as u32..index(reach.max[axis]).clamp(0, size) as u32
+            });
+            let [x, y, z] = ranges;
+            if !x.is_empty() && !y.is_empty() {
+                touched.extend(z.flat_map(|z| y.clone().map(move |y| [y, z])).map(|[y, z]| ([z, y], x.clone())));
+            }
+        }
+        // Rows that several stamps reach become one.
+        touched.sort_unstable_by_key(|(row, _)| *row);
+        touched.dedup_by(|(row, x), (kept, all)| {
+            let is_same = row == kept;
+            if is_same {
+                *all = all.start.min(x.start)..all.end.max(x.end);
+            }
+            is_same
+        });
+        let (mut distances, mut materials) = (Vec::new(), Vec::new());
+        for ([z, y], xs) in touched {
+            let row = out.index([xs.start, y, z]);
+            let len = xs.len();
+            let first = [xs.start, y, z];
+            let first = [0, 1, 2].map(|axis| region.min[axis].saturating_add(first[axis] as i32).saturating_mul(step));
+            let level_0 =
+                |min: [i32; 3], size: [u32; 3]| SourceRegion { min, size, level: 0, spacing: self.from.spacing };
+            let mut finest: Vec<Voxel<i16>> = Vec::with_capacity(len);
+            if region.level == 0 {
+                let samples = out.weights[row..][..len].iter().zip(&out.materials[row..][..len]);
+                finest.extend(samples.map(|(&weight, &material)| Voxel::new(weight, material)));
+            } else {
+                for point in 0..len as i32 {
+                    let at = [first[0].saturating_add(step * point), first[1], first[2]];
+                    distances.clear();
+                    distances.resize(1, 0.0);
+                    materials.clear();
+                    materials.resize(1, 0);
+                    self.from.source.fill(&level_0(at, [1; 3]), &mut distances, &mut materials);
+                    finest.push(Voxel::new(i16::from_voxels(distances[0]), materials[0]));
+                }
+            }
+            for (index, old) in (row..).zip(finest) {
+                let at = [first[0].saturating_add(step * (index - row) as i32), first[1], first[2]];
+                let reaching = stamps.iter().filter(|(reach, _)| reach.contains(at));
+                let new = reaching.fold(old, |old, (_, stamp)| stamp.at_point(old, at));
+                if new != old {
+                    (out.weights[index], out.materials[index]) = (new.weight, new.material);
+                }
+            }
         }
     }
 
@@ -279,4 +351,60 @@ impl Filler<'_> {
 struct Segment {
     points: Range<u32>,
     places: Range<i32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Grid, GridChunk, LevelSettings, Operation, QuantisedShape};
+
+    /// A point that stamps change has the sample of level 0 at every level, and any other the source's own.
+    #[test]
+    fn stamps_reach_every_level() {
+        let source = |[x, y, z]: [f64; 3]| y - 3.0 * libm::sin(x / 9.0) - 2.0 * libm::cos(z / 7.0);
+        let ball = |center, radius| QuantisedShape::sphere(center, radius).unwrap();
+        let stamps = [
+            QuantisedStamp::new(ball([5.0, 1.0, -7.0], 9.0), Operation::Dig, 0),
+            QuantisedStamp::new(ball([9.5, -2.0, -2.0], 5.0), Operation::Add, 3),
+            QuantisedStamp::new(ball([-20.0, 14.0, 20.0], 6.0), Operation::Add, 4),
+            QuantisedStamp::new(ball([8.0, 0.0, -4.0], 7.0), Operation::Paint, 5),
+            QuantisedStamp::new(ball([-58.0, 0.0, -57.0], 6.0), Operation::Dig, 0),
+            QuantisedStamp::new(ball([45.0, 0.0, 48.0], 12.0), Operation::Dig, 0),
+        ];
+        let (cells, extent) = (8, Region::new([-8; 3], [8; 3]));
+        let mut plain = Grid::<i16>::bounded(cells, extent).unwrap();
+        for position in extent.points() {
+            plain.insert(position, GridChunk::from_source(&source, position, cells, 1.0)).unwrap();
+        }
+        let mut edited = plain.clone();
+        stamps.iter().for_each(|stamp| _ = edited.apply(stamp));
+
+        let from = LevelSource { source: &source, cells, spacing: 1.0, stamps: &stamps, planes: None, isovalue: 0.0 };
+        let settings =
+            LevelSettings { levels: 3, falloff: 1.75, view_distance: 30.0, extent, ..LevelSettings::default() };
+        let cover = LevelCover::new(&[[-7.5, 0.0, -7.5]], &settings, None, |_| false).unwrap();
+        let (mut block, mut changed) = (LeafBlock::new(), [0; 3]);
+        for (leaf, _) in cover.leaves() {
+            block.fill(&from, &cover, leaf);
+            let corner = leaf.position.map(|v| v * cells as i32 - 1);
+            for (index, at) in Region::new([0; 3], [cells as i32 + 3; 3]).points().enumerate() {
+                let point = [0, 1, 2].map(|axis| (corner[axis] + at[axis]) << leaf.level);
+                let (before, after) = (plain.get(point), edited.get(point));
+                let found = Voxel::new(block.own.weights[index], block.own.materials[index]);
+                let limits = Region::new([-64; 3], [64; 3]);
+                if limits.contains(point) {
+                    // A closure answers alike at all levels.
+                    assert_eq!(found, after, "{point:?} of {leaf:?}, {before:?} before");
+                    changed[usize::from(leaf.level)] += usize::from(before != after);
+                }
+            }
+            let is_stamped = stamps.iter().any(|stamp| {
+                let cell = |v: [i32; 3]| v.map(|v| v * cells as i32);
+                let Region { min, max } = leaf.region();
+                !stamp.region().intersection(&Region::new(cell(min), cell(max))).is_empty()
+            });
+            assert!(!(is_stamped && from.is_empty(leaf)));
+        }
+        assert!(changed.iter().all(|&points| points > 0), "{changed:?}");
+    }
 }

@@ -3,7 +3,7 @@
 use fastrand::Rng;
 use marchless::{
     Bound, Grid, GridChunk, LeafBlock, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion,
-    Mesher, Region, Source, SourceRegion,
+    Mesher, Operation, QuantisedShape, QuantisedStamp, Region, Source, SourceRegion,
 };
 
 /// A ball with bumps, which answers differently at each level.
@@ -62,7 +62,7 @@ impl Source for Bumps {
 
 /// Meshes all leaves of a cover that may have a surface.
 fn union(source: &LevelSource<'_>, cover: &LevelCover, settings: &MeshSettings) -> MeshUnion {
-    let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
+    let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::new(), MeshBuffer::new());
     let mut union = MeshUnion::new();
     for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
         block.fill(source, cover, leaf);
@@ -82,7 +82,15 @@ fn whole_covers_are_closed() {
         // Half of them are cut by the border of a bounded volume.
         let planes = (round % 2 == 1).then(|| Region::new([-17, -40, -23], [30, 21, 38]));
         let isovalue = if round % 4 < 2 { 0.0 } else { 1.25 };
-        let source = LevelSource { source: &bumps, cells, spacing: 1.0, planes, isovalue };
+        let stamps: Vec<QuantisedStamp> = (0..random.usize(0..20))
+            .map(|_| {
+                let center = [(); 3].map(|()| (random.f64() - 0.5) * 90.0);
+                let shape = QuantisedShape::sphere(center, 2.0 + 14.0 * random.f64()).expect("it is finite");
+                let operation = [Operation::Dig, Operation::Add, Operation::Paint][random.usize(..3)];
+                QuantisedStamp::new(shape, operation, random.u8(5..9)).with_isovalue(isovalue)
+            })
+            .collect();
+        let source = LevelSource { source: &bumps, cells, spacing: 1.0, stamps: &stamps, planes, isovalue };
         let settings = LevelSettings { levels: 4, falloff: 1.75, view_distance: 40.0, ..LevelSettings::default() };
         let viewers: Vec<[f64; 3]> =
             (0..random.usize(1..4)).map(|_| [(); 3].map(|()| (random.f64() - 0.5) * 80.0 / f64::from(cells))).collect();
@@ -105,10 +113,11 @@ fn leaves_of_level_0_are_chunks_of_a_grid() {
     for position in chunks.points() {
         grid.insert(position, GridChunk::from_source(&bumps, position, 8, 1.0)).expect("it is within the bounds");
     }
-    let source = LevelSource { source: &bumps, cells: 8, spacing: 1.0, planes: grid.planes(), isovalue: 0.0 };
+    let source =
+        LevelSource { source: &bumps, cells: 8, spacing: 1.0, stamps: &[], planes: grid.planes(), isovalue: 0.0 };
     let settings = LevelSettings { levels: 1, view_distance: 30.0, extent: chunks, ..LevelSettings::default() };
     let cover = LevelCover::new(&[[0.0; 3]], &settings, None, |_| false).expect("the settings are sound");
-    let (mut mesher, mut block) = (Mesher::new(), LeafBlock::<i16>::new());
+    let (mut mesher, mut block) = (Mesher::new(), LeafBlock::new());
     let (mut found, mut expected, mut drawn) = (MeshBuffer::new(), MeshBuffer::new(), 0);
     for (leaf, _) in cover.leaves() {
         block.fill(&source, &cover, leaf);
@@ -124,10 +133,10 @@ fn leaves_of_level_0_are_chunks_of_a_grid() {
 #[test]
 fn samples_are_in_voxels_of_level_0() {
     let slope = |[x, y, z]: [f64; 3]| (3.0 * x - 2.0 * y + 6.0 * z) / 7.0 - 5.0;
-    let source = LevelSource { source: &slope, cells: 6, spacing: 1.0, planes: None, isovalue: 0.0 };
+    let source = LevelSource { source: &slope, cells: 6, spacing: 1.0, stamps: &[], planes: None, isovalue: 0.0 };
     let settings = LevelSettings { levels: 7, falloff: 1.75, view_distance: 200.0, ..LevelSettings::default() };
     let cover = LevelCover::new(&[[0.3; 3]], &settings, None, |_| false).expect("the settings are sound");
-    let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::<i16>::new(), MeshBuffer::new());
+    let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::new(), MeshBuffer::new());
     let mut levels = [0; 7];
     for (leaf, _) in cover.leaves() {
         block.fill(&source, &cover, leaf);
