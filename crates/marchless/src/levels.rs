@@ -73,6 +73,8 @@ impl Default for LevelSettings {
 /// surface. So [`Mesher::mesh_leaf`](crate::Mesher::mesh_leaf) can mesh all of them without a seam. A box that is known
 /// to be empty is one leaf, whatever its size.
 ///
+/// When viewers move, make a new cover; [`LevelCover::changes_to`] leads to it from the one that is shown.
+///
 /// ```
 /// use marchless::{LeafKey, LevelCover, LevelSettings};
 ///
