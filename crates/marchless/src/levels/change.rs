@@ -47,7 +47,7 @@ enum Step {
     RemoveRoot { key: LeafKey },
     /// Splits a leaf. Of its eight children, the bits of `exist` exist, and those of `empty` are empty.
     Split { key: LeafKey, exist: u8, empty: u8 },
-    /// Makes a node whose children are leaves a leaf.
+    /// Makes a node a leaf: one whose children are leaves, or a leaf that has become empty or has got a surface.
     Merge { key: LeafKey, is_empty: bool },
 }
 
@@ -72,7 +72,8 @@ impl LevelCover {
     /// The way from this cover to another: changes to be made one after the other. After each of them, the cover keeps
     /// what a [`LevelCover`] promises. Most change a single chunk. `None` if the two have different numbers of levels.
     ///
-    /// Both covers must have been made with the same `is_empty`.
+    /// Edits may have made chunks empty, or not empty any more: such leaves are both removed and added. The extent must be
+    /// the same.
     pub fn changes_to(&self, target: &Self) -> Option<Vec<LevelChange>> {
         if self.top != target.top {
             return None;
@@ -135,6 +136,8 @@ impl LevelCover {
                 let exist = bits(|state| !matches!(state, State::Nowhere));
                 steps.push(Step::Split { key: node.key, exist, empty: bits(|state| matches!(state, State::Empty)) });
             }
+            (State::Leaf, State::Empty) => steps.push(Step::Merge { key: node.key, is_empty: true }),
+            (State::Empty, State::Leaf) => steps.push(Step::Merge { key: node.key, is_empty: false }),
             _ => {}
         }
     }

@@ -43,11 +43,16 @@ fn check(cover: &LevelCover, viewers: &[[f64; 3]], settings: &LevelSettings) -> 
 
 /// Checks that leaves cover the roots, once, and that they fit each other.
 fn check_leaves(cover: &LevelCover) -> Result<(), TestCaseError> {
+    check_leaves_of(cover, |_| true)
+}
+
+/// [`check_leaves`], with other ground in some leaves.
+fn check_leaves_of(cover: &LevelCover, is_known: impl Fn(LeafKey) -> bool) -> Result<(), TestCaseError> {
     let leaves: Vec<(LeafKey, bool)> = cover.leaves().collect();
     let existing = |leaf: LeafKey| leaf.region().intersection(&EXTENT);
     let mut covered = 0u64;
     for &(leaf, empty) in &leaves {
-        prop_assert_eq!(empty, is_empty(leaf), "{:?}", leaf);
+        prop_assert!(empty == is_empty(leaf) || !is_known(leaf), "{:?}", leaf);
         let region = existing(leaf);
         prop_assert!(!region.is_empty(), "{:?} is outside", leaf);
         covered += region.size().map(u64::from).iter().product::<u64>();
@@ -106,12 +111,18 @@ proptest! {
         [from, to] in proptest::array::uniform2(prop::collection::vec(viewer(), 0..3)),
         (levels, falloff) in (1..5u8, 1.75..3.0f64),
         distances in proptest::array::uniform2(0.5..2.5f64),
+        dug in prop::option::of((EXTENT.min[0]..EXTENT.max[0], -9..9i32)),
     ) {
-        let [from_distance, to_distance] = distances.map(|distance| distance * f64::from(1u32 << (levels - 1)));
-        let cover = |viewers: &[[f64; 3]], distance| {
-            LevelCover::new(viewers, &settings(levels, falloff, distance), None, is_empty)
+        // Chunks right of a place are dug away, or filled, between the two covers.
+        let is_dug = |key: LeafKey| dug.is_some_and(|(from, _)| key.region().max[0] > from);
+        let is_empty_then = |key: LeafKey| match dug {
+            Some((_, height)) if is_dug(key) => key.region().min[1] > height || key.region().max[1] < height - 2,
+            _ => is_empty(key),
         };
-        let (start, target) = (cover(&from, from_distance)?, cover(&to, to_distance)?);
+        let [from_distance, to_distance] = distances.map(|distance| distance * f64::from(1u32 << (levels - 1)));
+        let settings = |distance| settings(levels, falloff, distance);
+        let start = LevelCover::new(&from, &settings(from_distance), None, is_empty)?;
+        let target = LevelCover::new(&to, &settings(to_distance), None, is_empty_then)?;
         let changes = start.changes_to(&target).expect("the numbers of levels are the same");
         let mut now = start.clone();
         let drawn = |cover: &LevelCover| -> BTreeMap<LeafKey, (bool, FinerNeighbours)> {
@@ -124,14 +135,14 @@ proptest! {
                 // Either may come first.
                 let (mut other, mut this) = (now.clone(), now.clone());
                 other.apply(next);
-                check_leaves(&other)?;
+                check_leaves_of(&other, |leaf| !is_dug(leaf))?;
                 other.apply(change);
                 this.apply(change);
                 this.apply(next);
                 prop_assert_eq!(drawn(&other), drawn(&this));
             }
             now.apply(change);
-            check_leaves(&now)?;
+            check_leaves_of(&now, |leaf| !is_dug(leaf))?;
             for leaf in &change.removed {
                 prop_assert!(shown.remove(leaf).is_some(), "{:?} was not drawn", leaf);
             }
