@@ -54,7 +54,7 @@ impl Mesher {
     /// [`Mesher::mesh`].
     ///
     /// Not guaranteed: that no two triangles cross at a border of levels. In white noise around every pattern of levels,
-    /// some did in 0.4 % of all unions, mostly where finer leaves wind around a point; on planes, none did.
+    /// some did in 0.6 % of all unions, mostly where finer leaves wind around a point; on planes, none did.
     ///
     /// ```
     /// use marchless::{FinerNeighbours, LeafSamples, MeshBuffer, MeshSettings, MeshUnion, Mesher, Samples, Shape};
