@@ -1,10 +1,9 @@
 //! The results: the least times, and their table.
 
 use core::{fmt, hint::black_box};
-use std::time::Instant;
 
 use criterion::{BenchmarkGroup, measurement::WallTime};
-use marchless_benches::{aligned, duration};
+use marchless_benches::{Times, aligned, duration};
 
 use crate::block::Block;
 
@@ -58,25 +57,15 @@ impl Results {
         prepare: impl FnOnce() -> R,
     ) {
         let (mut prepare, mut run) = (Some(prepare), None);
-        let (mut times, mut triangles) = (Vec::new(), 0);
+        let (mut times, mut triangles) = (Times::default(), 0);
         group.bench_function(subject.to_string(), |bencher| {
             if let Some(prepare) = prepare.take() {
                 run = Some(prepare());
             }
             let Some(run) = &mut run else { return };
-            bencher.iter_custom(|iterations| {
-                let start = Instant::now();
-                for _ in 0..iterations {
-                    triangles = black_box(run());
-                }
-                let elapsed = start.elapsed();
-                times.push(elapsed.as_secs_f64() / iterations as f64);
-                elapsed
-            });
+            bencher.iter_custom(|iterations| times.of(iterations, || triangles = black_box(run())));
         });
-        // Those of the warm-up came first.
-        let warm = times.len().saturating_sub(SAMPLES);
-        if let Some(seconds) = times[warm..].iter().copied().reduce(f64::min) {
+        if let Some(seconds) = times.least(SAMPLES) {
             self.0.push(Timing { block: (block.field.name(), block.faces.len()), subject, seconds, triangles });
         }
     }

@@ -1,12 +1,14 @@
 //! The fields that benches mesh. They differ in the amount and the shape of their surface.
 
 mod table;
+mod times;
 
 use std::thread;
 
 use noise::{Fbm, MultiFractal, NoiseFn, Perlin};
 
 pub use table::{aligned, duration};
+pub use times::Times;
 
 /// A kind of field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
