@@ -76,7 +76,7 @@ impl LevelSource<'_> {
 ///
 /// ```
 /// use marchless::{
-///     Bound, LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion, Mesher,
+///     LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion, Mesher,
 /// };
 ///
 /// // A planet of radius 100 around the origin, seen from above its north pole.
@@ -244,7 +244,7 @@ impl Filler<'_> {
     }
 
     /// Applies the stamps to a box of the source's samples.
-    fn apply_stamps(&mut self, region: &SourceRegion, out: &mut SampleBox) {
+    fn apply_stamps(&self, region: &SourceRegion, out: &mut SampleBox) {
         let step = 1 << region.level;
         let stamps: Vec<(Region, &QuantisedStamp)> = self.from.stamps.iter().map(|s| (s.region(), s)).collect();
         let mut touched = Vec::new();
@@ -269,31 +269,15 @@ impl Filler<'_> {
             }
             is_same
         });
-        let (mut distances, mut materials) = (Vec::new(), Vec::new());
         for ([z, y], xs) in touched {
-            let row = out.index([xs.start, y, z]);
-            let len = xs.len();
-            let first = [xs.start, y, z];
-            let first = [0, 1, 2].map(|axis| region.min[axis].saturating_add(first[axis] as i32).saturating_mul(step));
-            let level_0 =
-                |min: [i32; 3], size: [u32; 3]| SourceRegion { min, size, level: 0, spacing: self.from.spacing };
-            let mut finest: Vec<Voxel<i16>> = Vec::with_capacity(len);
-            if region.level == 0 {
-                let samples = out.weights[row..][..len].iter().zip(&out.materials[row..][..len]);
-                finest.extend(samples.map(|(&weight, &material)| Voxel::new(weight, material)));
-            } else {
-                for point in 0..len as i32 {
-                    let at = [first[0].saturating_add(step * point), first[1], first[2]];
-                    distances.clear();
-                    distances.resize(1, 0.0);
-                    materials.clear();
-                    materials.resize(1, 0);
-                    self.from.source.fill(&level_0(at, [1; 3]), &mut distances, &mut materials);
-                    finest.push(Voxel::new(i16::from_voxels(distances[0]), materials[0]));
-                }
-            }
-            for (index, old) in (row..).zip(finest) {
-                let at = [first[0].saturating_add(step * (index - row) as i32), first[1], first[2]];
+            for x in xs {
+                let index = out.index([x, y, z]);
+                let point = [x, y, z];
+                let at = [0, 1, 2].map(|k| region.min[k].saturating_add(point[k] as i32).saturating_mul(step));
+                let old = match region.level {
+                    0 => Voxel::new(out.weights[index], out.materials[index]),
+                    _ => self.finest(at),
+                };
                 let reaching = stamps.iter().filter(|(reach, _)| reach.contains(at));
                 let new = reaching.fold(old, |old, (_, stamp)| stamp.at_point(old, at));
                 if new != old {
@@ -301,6 +285,14 @@ impl Filler<'_> {
                 }
             }
         }
+    }
+
+    /// The source's sample of level 0 at one lattice point.
+    fn finest(&self, point: [i32; 3]) -> Voxel<i16> {
+        let region = SourceRegion { min: point, size: [1; 3], level: 0, spacing: self.from.spacing };
+        let (mut distance, mut material) = ([0.0], [0]);
+        self.from.source.fill(&region, &mut distance, &mut material);
+        Voxel::new(i16::from_voxels(distance[0]), material[0])
     }
 
     /// Whether any chunk of this level that a box of points touches is split.

@@ -178,7 +178,7 @@ impl LevelCover {
     }
 
     /// All that is left on the way to another cover, as one change.
-    fn all_at_once(&mut self, target: &Self) -> Option<LevelChange> {
+    pub(super) fn all_at_once(&mut self, target: &Self) -> Option<LevelChange> {
         let (mut cover, mut steps) = (self.clone(), Vec::new());
         loop {
             let next = cover.steps_to(target);

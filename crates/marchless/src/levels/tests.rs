@@ -162,6 +162,12 @@ proptest! {
             prop_assert_eq!(&shown, &expected);
         }
         prop_assert_eq!(drawn(&now), drawn(&target));
+        // The way out where no single step fits.
+        let (mut all, mut once) = (start.clone(), start);
+        if let Some(change) = all.all_at_once(&target) {
+            once.apply(&change);
+        }
+        prop_assert_eq!(drawn(&once), drawn(&target));
         prop_assert!(now.nodes.len() < 64 || now.nodes.len() <= 2 * now.reachable().count() + 16);
     }
 

@@ -109,17 +109,17 @@ impl Mesher {
             return Err(MeshError::LeafTopology);
         }
         self.mesh(leaf.samples, settings, out)?;
-        let displacements = leaf.finer.displacements();
+        if leaf.finer.is_empty() {
+            return Ok(());
+        }
         let Transitions { border, fine } = &mut self.transitions;
-        border.collect(leaf, &displacements, &mut out.positions);
+        border.collect(leaf, &leaf.finer.displacements(), &mut out.positions);
         for face in Face::ALL {
             if let Some(samples) = &leaf.faces[face.index()] {
                 fine.add(leaf, face, samples, settings, border, out);
             }
         }
-        if !leaf.finer.is_empty() {
-            out.bounds = bounds(&out.positions);
-        }
+        out.bounds = bounds(&out.positions);
         Ok(())
     }
 }

@@ -32,9 +32,6 @@ impl BorderVertices {
         displacements: &Displacements,
         positions: &mut [[f32; 3]],
     ) {
-        if displacements.is_none() && leaf.faces.iter().all(Option::is_none) {
-            return;
-        }
         let (cells, planes) = (leaf.cells, leaf.planes());
         for plane in planes.iter().flatten() {
             self.faces[plane.face.index()].resize(edge_count(plane), 0);

@@ -118,11 +118,6 @@ impl Displacements {
         };
         self.0[class(0) + 3 * class(1) + 9 * class(2)]
     }
-
-    /// True if no point moves.
-    pub(super) fn is_none(&self) -> bool {
-        self.0 == [[0.0; 3]; 27]
-    }
 }
 
 #[cfg(test)]

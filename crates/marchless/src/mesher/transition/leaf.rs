@@ -79,7 +79,7 @@ impl<'a, W: Weight> LeafSamples<'a, W> {
     fn check_points(&self, plane: &FacePlane, samples: &Samples<'a, W>) -> Result<(), LeafError> {
         let [u, v] = plane.cells;
         let strides = self.samples.shape().strides();
-        let first = strides.iter().sum::<usize>() + plane.layer(self.cells) * strides[plane.axis];
+        let first = strides.iter().sum::<usize>() + plane.across / 2 * strides[plane.axis];
         for j in 0..=v {
             for i in 0..=u {
                 let own = first + i * strides[plane.axes[0]] + j * strides[plane.axes[1]];
@@ -96,7 +96,7 @@ impl<'a, W: Weight> LeafSamples<'a, W> {
             let along = 1 - across;
             for k in 0..=2 * plane.cells[along] {
                 let mut at = [0; 2];
-                (at[across], at[along]) = (2 * other.layer(self.cells), k);
+                (at[across], at[along]) = (other.across, k);
                 let point = plane.point(at);
                 if differ(samples, plane.index(at), other_samples, other.index(other.within(point))) {
                     return Err(LeafError::PointsDiffer { face: plane.face, point });
@@ -133,7 +133,7 @@ pub(super) struct FacePlane {
     pub(super) axes: [usize; 2],
     /// The leaf's cells along these axes.
     pub(super) cells: [usize; 2],
-    /// Twice the leaf's cells across the plane, if the face is a high one: the finer coordinate of its points.
+    /// The coordinate of its points across the plane, in finer steps from the leaf's corner.
     across: usize,
     /// The distances in memory of the face's samples along x, y and z.
     pub(super) strides: [usize; 3],
@@ -156,11 +156,6 @@ impl FacePlane {
             size[axis] = 2 * cells as u32 + 3;
         }
         Shape::new(size).expect("a leaf's cells are few")
-    }
-
-    /// The leaf's coordinate of the face, in its own cells.
-    fn layer(&self, cells: [u32; 3]) -> usize {
-        if self.face.is_high() { cells[self.axis] as usize } else { 0 }
     }
 
     /// The index of the finer sample on the face at `at`, in finer steps from the leaf's corner.

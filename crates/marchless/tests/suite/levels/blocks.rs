@@ -6,6 +6,8 @@ use marchless::{
     Mesher, Operation, QuantisedShape, QuantisedStamp, Region, Source, SourceRegion,
 };
 
+use crate::support::random;
+
 /// A ball with bumps, which answers differently at each level.
 #[derive(Clone, Copy)]
 struct Bumps {
@@ -30,10 +32,8 @@ impl Source for Bumps {
         for (index, (distance, material)) in (0u32..).zip(distances.iter_mut().zip(materials)) {
             let at = [index % nx, index / nx % ny, index / (nx * ny)];
             let position = region.position(at);
-            let seed = position.map(f64::to_bits).into_iter().fold(region.level.into(), |seed: u64, bits| {
-                (seed ^ bits).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(31)
-            });
-            let mut random = Rng::with_seed(seed);
+            let point = [0, 1, 2].map(|axis| region.min[axis] + at[axis] as i32);
+            let mut random = Rng::with_seed(random(region.level.into(), point));
             let jitter = if region.level == 0 { 0.0 } else { random.f64() - 0.5 };
             *distance = ((self.distance(position) + jitter) / region.spacing) as f32;
             *material = random.u8(1..5);

@@ -4,7 +4,7 @@ use fastrand::Rng;
 use marchless::{FinerNeighbours, LeafError, LeafSamples, Samples, Shape, cell::Face};
 
 use super::cover::{Cover, Leaf};
-use crate::support::TestWeight;
+use crate::support::{TestWeight, random};
 
 /// A field of samples, with air on and beyond the border of the box.
 #[derive(Clone, Debug)]
@@ -71,11 +71,7 @@ impl<W: TestWeight> Field<W> {
 
     /// The sample of a lattice point at a level.
     fn at(&self, point: [i32; 3], level: u8) -> (W, u8) {
-        let key = [point[0], point[1], point[2], level.into()];
-        let mut random =
-            Rng::with_seed(key.into_iter().fold(self.seed, |hash, v| {
-                (hash ^ v as u32 as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29)
-            }));
+        let mut random = Rng::with_seed(random(self.seed ^ u64::from(level) << 40, point));
         let material = random.u8(..4);
         let weight = match &self.kind {
             Kind::Noise(weights) => weights[random.usize(..weights.len())],
