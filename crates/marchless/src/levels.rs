@@ -6,6 +6,7 @@ mod change;
 mod tree;
 
 use alloc::{collections::BTreeMap, vec::Vec};
+use core::cmp::Ordering;
 
 use thiserror::Error;
 
@@ -51,19 +52,29 @@ pub struct LevelSettings {
     /// The share by which a chunk that is split, or in view at all, must be farther away than another one before that
     /// changes. So leaves do not flicker where a viewer goes to and fro. 0 to 1; default 0.1.
     pub hysteresis: f64,
-    /// How far viewers see, in chunks of level 0, above 0. Chunks of the coarsest level that are nearer are in the
-    /// cover, whole.
-    pub view_distance: f64,
     /// The chunks of level 0 that exist at all. A coarser leaf may reach beyond them.
     pub extent: Region,
+    /// The chunks of level 0 that are in the cover wherever viewers are, with the chunks of the coarsest level that hold
+    /// them; may be empty.
+    pub kept: Region,
 }
 
 impl Default for LevelSettings {
-    /// Six levels up to 128 chunks (4,096 voxels) away, the finest up to 6 (192 voxels); no limits of the extent.
+    /// Six levels, the finest up to 6 chunks (192 voxels) away; no limits of the extent, and nothing kept.
     fn default() -> Self {
         let extent = Region::new([i32::MIN; 3], [i32::MAX; 3]);
-        Self { levels: 6, falloff: 3.0, hysteresis: 0.1, view_distance: 128.0, extent }
+        Self { levels: 6, falloff: 3.0, hysteresis: 0.1, extent, kept: Region::new([0; 3], [0; 3]) }
     }
+}
+
+/// A viewer of a [`LevelCover`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelViewer {
+    /// Where it is, in chunks of level 0.
+    pub position: [f64; 3],
+    /// How far it sees, in chunks of level 0, above 0; may be infinite. Chunks of the coarsest level that are nearer are
+    /// in the cover, whole.
+    pub distance: f64,
 }
 
 /// The leaves of an octree of chunks that cover what viewers see: fine ones near them, coarser ones farther away.
@@ -76,11 +87,11 @@ impl Default for LevelSettings {
 /// When viewers move, make a new cover; [`LevelCover::changes_to`] leads to it from the one that is shown.
 ///
 /// ```
-/// use marchless::{LeafKey, LevelCover, LevelSettings};
+/// use marchless::{LeafKey, LevelCover, LevelSettings, LevelViewer};
 ///
 /// // Ground at the height 0 along y; all chunks are empty but those that it passes.
 /// let is_empty = |leaf: LeafKey| !(leaf.region().min[1] < 0 && leaf.region().max[1] > -1);
-/// let viewer = [0.5, 0.1, 0.5];
+/// let viewer = LevelViewer { position: [0.5, 0.1, 0.5], distance: 128.0 };
 /// let cover = LevelCover::new(&[viewer], &LevelSettings::default(), None, is_empty)?;
 ///
 /// let below = cover.leaf_at([0, -1, 0]).expect("it is in view");
@@ -98,13 +109,15 @@ pub struct LevelCover {
     roots: BTreeMap<[i32; 3], u32>,
     /// The eight children of a split node lie together.
     nodes: Vec<Node>,
+    /// The number of nodes from which on those that cannot be reached are dropped.
+    compact_at: usize,
 }
 
 impl LevelCover {
     /// The most leaves of a cover.
     pub const MAX_LEAVES: usize = 1 << 20;
 
-    /// The cover for viewers at these places, in chunks of level 0. `former`: the cover from before, from which it
+    /// The cover for these viewers. `former`: the cover from before, from which it
     /// differs no more than need be ([`LevelSettings::hysteresis`]). `is_empty`: whether a chunk is certain to have no
     /// surface, borders included; called at most once for each chunk.
     ///
@@ -112,9 +125,10 @@ impl LevelCover {
     /// takes less than 3 ms besides the calls of `is_empty`.
     ///
     /// # Errors
-    /// [`LevelError`] if a setting is out of range, a viewer's place is not finite, or there would be too many leaves.
+    /// [`LevelError`] if a setting is out of range, a viewer's place is not finite or it does not see, or there would be
+    /// too many leaves.
     pub fn new(
-        viewers: &[[f64; 3]],
+        viewers: &[LevelViewer],
         settings: &LevelSettings,
         former: Option<&Self>,
         mut is_empty: impl FnMut(LeafKey) -> bool,
@@ -122,7 +136,7 @@ impl LevelCover {
         settings.check(viewers)?;
         let top = settings.levels - 1;
         let former = former.filter(|former| former.top == top);
-        let mut cover = Self { top, roots: BTreeMap::new(), nodes: Vec::new() };
+        let mut cover = Self { top, roots: BTreeMap::new(), nodes: Vec::new(), compact_at: 0 };
         let mut builder = Builder { viewers, settings, former, is_empty: &mut is_empty };
         builder.add_roots(&mut cover)?;
         let roots: Vec<u32> = cover.roots.values().copied().collect();
@@ -153,6 +167,39 @@ impl LevelCover {
         self.node_over(key).is_some_and(|node| node.key == key && matches!(node.state, State::Split { .. }))
     }
 
+    /// The leaves that a box of chunks of level 0 overlaps or touches, in order, and whether each is empty.
+    pub fn leaves_near(&self, chunks: Region) -> Vec<(LeafKey, bool)> {
+        self.leaves_touching(&[chunks])
+    }
+
+    /// The change that puts a surface into some of this cover's empty leaves, because of an edit: each becomes a leaf with
+    /// a surface, split as the viewers want it, and others are split until all fit. Keys that are not empty leaves of the
+    /// cover are left out.
+    ///
+    /// # Errors
+    /// As [`LevelCover::new`].
+    pub fn fill(
+        &self,
+        leaves: &[LeafKey],
+        viewers: &[LevelViewer],
+        settings: &LevelSettings,
+        mut is_empty: impl FnMut(LeafKey) -> bool,
+    ) -> Result<LevelChange, LevelError> {
+        settings.check(viewers)?;
+        let mut filled = self.clone();
+        let mut builder = Builder { viewers, settings, former: Some(self), is_empty: &mut is_empty };
+        for leaf in leaves {
+            let Some(index) = filled.index_over(*leaf) else { continue };
+            let node = &mut filled.nodes[index as usize];
+            if node.key == *leaf && matches!(node.state, State::Empty) {
+                node.state = State::Leaf;
+                builder.refine(&mut filled, index)?;
+            }
+        }
+        balance::balance(&mut filled, &mut builder)?;
+        Ok(self.clone().all_at_once(&filled).unwrap_or_default())
+    }
+
     /// The neighbours of a leaf that are one level finer.
     pub fn finer_neighbours(&self, leaf: LeafKey) -> FinerNeighbours {
         if leaf.level == 0 {
@@ -163,7 +210,7 @@ impl LevelCover {
 }
 
 impl LevelSettings {
-    fn check(&self, viewers: &[[f64; 3]]) -> Result<(), LevelError> {
+    fn check(&self, viewers: &[LevelViewer]) -> Result<(), LevelError> {
         if !(1..=7).contains(&self.levels) {
             return Err(LevelError::Levels { found: self.levels });
         }
@@ -173,17 +220,22 @@ impl LevelSettings {
         };
         number("falloff", "1.75 or more", self.falloff, self.falloff >= 1.75)?;
         number("hysteresis", "from 0 to 1", self.hysteresis, (0.0..=1.0).contains(&self.hysteresis))?;
-        number("view_distance", "above 0", self.view_distance, self.view_distance > 0.0)?;
-        match viewers.iter().find(|viewer| !viewer.iter().all(|v| v.is_finite())) {
-            Some(&found) => Err(LevelError::Viewer { found }),
-            None => Ok(()),
+        for LevelViewer { position, distance } in viewers {
+            if !position.iter().all(|v| v.is_finite()) {
+                return Err(LevelError::Viewer { found: *position });
+            }
+            // Not a number is not above 0.
+            if distance.partial_cmp(&0.0) != Some(Ordering::Greater) {
+                return Err(LevelError::Setting { name: "a viewer's distance", expected: "above 0", found: *distance });
+            }
         }
+        Ok(())
     }
 }
 
 /// What decides which chunks are split.
 struct Builder<'a> {
-    viewers: &'a [[f64; 3]],
+    viewers: &'a [LevelViewer],
     settings: &'a LevelSettings,
     former: Option<&'a LevelCover>,
     is_empty: &'a mut dyn FnMut(LeafKey) -> bool,
@@ -192,26 +244,44 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Adds the chunks of the coarsest level that viewers see.
     fn add_roots(&self, cover: &mut LevelCover) -> Result<(), LevelError> {
-        let (distance, width) = (self.settings.view_distance, f64::from(1u32 << cover.top));
-        let reach = distance * (1.0 + self.settings.hysteresis);
-        let row = 2.0 * reach / width + 2.0;
-        if row * row * row * self.viewers.len() as f64 > 8.0 * LevelCover::MAX_LEAVES as f64 {
+        let (top, width) = (cover.top, f64::from(1u32 << cover.top));
+        let root = |chunks: Region| {
+            Region::new(chunks.min.map(|v| v >> top), chunks.max.map(|v| (v.saturating_sub(1) >> top) + 1))
+        };
+        let extent = self.settings.extent;
+        let existing = if extent.is_empty() { extent } else { root(extent) };
+        let kept = self.settings.kept.intersection(&extent);
+        if !kept.is_empty() {
+            self.add_roots_in(root(kept), cover, |_| true)?;
+        }
+        for &LevelViewer { position, distance } in self.viewers {
+            let reach = distance * (1.0 + self.settings.hysteresis);
+            let ends = position.map(|v| [v - reach, v + reach].map(|v| libm::floor(v / width) as i32));
+            let region = Region::new(ends.map(|[low, _]| low), ends.map(|[_, high]| high.saturating_add(1)));
+            self.add_roots_in(region.intersection(&existing), cover, |key| {
+                let was_in_view = self.former.is_some_and(|former| former.roots.contains_key(&key.position));
+                let limit = if was_in_view { reach } else { distance };
+                distance_squared(position, key) < limit * limit
+            })?;
+        }
+        self.check_size(cover)
+    }
+
+    /// Adds those of the coarsest chunks in a box that are in view.
+    fn add_roots_in(
+        &self,
+        positions: Region,
+        cover: &mut LevelCover,
+        is_in_view: impl Fn(LeafKey) -> bool,
+    ) -> Result<(), LevelError> {
+        if positions.size().into_iter().map(f64::from).product::<f64>() > 8.0 * LevelCover::MAX_LEAVES as f64 {
             return Err(LevelError::TooManyLeaves);
         }
-        for viewer in self.viewers {
-            let ends = viewer.map(|v| [v - reach, v + reach].map(|v| libm::floor(v / width) as i32));
-            let region = Region::new(ends.map(|[low, _]| low), ends.map(|[_, high]| high.saturating_add(1)));
-            for position in region.points() {
-                let key = LeafKey { level: cover.top, position };
-                let was_in_view = self.former.is_some_and(|former| former.roots.contains_key(&position));
-                let limit = if was_in_view { reach } else { distance };
-                if !cover.roots.contains_key(&position)
-                    && self.exists(key)
-                    && distance_squared(*viewer, key) < limit * limit
-                {
-                    cover.roots.insert(position, cover.nodes.len() as u32);
-                    cover.nodes.push(Node { key, state: State::Leaf });
-                }
+        for position in positions.points() {
+            let key = LeafKey { level: cover.top, position };
+            if !cover.roots.contains_key(&position) && self.exists(key) && is_in_view(key) {
+                cover.roots.insert(position, cover.nodes.len() as u32);
+                cover.nodes.push(Node { key, state: State::Leaf });
             }
         }
         self.check_size(cover)
@@ -250,7 +320,7 @@ impl Builder<'_> {
         let width = f64::from(1u32 << key.level);
         let was_split = self.former.is_some_and(|former| former.is_split(key));
         let limit = self.settings.falloff * width * if was_split { 1.0 + self.settings.hysteresis } else { 1.0 };
-        key.level > 0 && self.viewers.iter().any(|viewer| distance_squared(*viewer, key) < limit * limit)
+        key.level > 0 && self.viewers.iter().any(|viewer| distance_squared(viewer.position, key) < limit * limit)
     }
 
     fn exists(&self, key: LeafKey) -> bool {
@@ -310,7 +380,7 @@ pub enum LevelError {
     },
     /// There would be more than [`LevelCover::MAX_LEAVES`] leaves.
     #[error(
-        "there would be more than {} leaves; a shorter view distance, more levels or a lower falloff make fewer",
+        "there would be more than {} leaves; viewers that see less far, more levels or a lower falloff make fewer",
         LevelCover::MAX_LEAVES
     )]
     TooManyLeaves,

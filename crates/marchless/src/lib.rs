@@ -133,7 +133,7 @@ pub use grid::{
     MIN_CHUNK_CELLS, Neighbourhood, NeighbourhoodView, SamplePool,
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
-pub use levels::{LeafBlock, LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelSource};
+pub use levels::{LeafBlock, LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelSource, LevelViewer};
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
 pub use mesher::{FinerNeighbours, LeafError, LeafSamples, MeshError, MeshSettings, Mesher, SlabMesher, Topology};

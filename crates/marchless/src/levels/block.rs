@@ -7,7 +7,7 @@ use super::{LeafKey, LevelCover};
 use crate::{
     brush::QuantisedStamp,
     cell::Face,
-    grid::border::Border,
+    grid::{Grid, GridChunk, border::Border},
     lattice::{MAX_CHUNK_CELLS, Region, Samples, Shape},
     mesher::{FinerNeighbours, LeafError, LeafSamples},
     sample::{Voxel, Weight},
@@ -25,6 +25,9 @@ pub struct LevelSource<'a> {
     pub spacing: f64,
     /// What has been edited, in order. Stamps far from a leaf do not matter to it, so they may be left out.
     pub stamps: &'a [QuantisedStamp],
+    /// Chunks of level 0 whose samples are known, with everything that has been edited: they count instead of the
+    /// stamps there. A chunk with very many edits is better given by its samples.
+    pub known: Option<&'a Grid<i16>>,
     /// The border of a bounded volume, if it has one: its outermost planes of lattice points, in voxels of level 0, as
     /// [`Grid::planes`](crate::Grid::planes) gives them. What lies beyond is air, and surfaces are closed half a voxel
     /// inside.
@@ -35,8 +38,8 @@ pub struct LevelSource<'a> {
 
 impl LevelSource<'_> {
     /// True if a leaf is certain to have no surface: [`Source::bound`] says so of the leaf and of four lattice points of
-    /// its level around it, no stamp reaches these points, and no border cuts solid ground there. It suits
-    /// [`LevelCover::new`].
+    /// its level around it, neither a stamp nor a known chunk reaches these points, and no border cuts solid ground
+    /// there. It suits [`LevelCover::new`].
     pub fn is_empty(&self, leaf: LeafKey) -> bool {
         let cells = self.cells();
         let region = SourceRegion {
@@ -49,7 +52,13 @@ impl LevelSource<'_> {
         let scaled = |v: i64| (v << leaf.level).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
         let end = |axis: usize| i64::from(region.min[axis]) + i64::from(region.size[axis]);
         let points = Region::new(region.min.map(|v| scaled(v.into())), [0, 1, 2].map(|axis| scaled(end(axis))));
-        if self.stamps.iter().any(|stamp| !stamp.region().intersection(&points).is_empty()) {
+        let reaches = |edited: Region| !edited.intersection(&points).is_empty();
+        let is_known = |known: &Grid<i16>| {
+            let chunk = |v: i32| v.div_euclid(known.chunk_cells() as i32);
+            let chunks = Region::new(points.min.map(chunk), points.max.map(|v| chunk(v.saturating_sub(1)) + 1));
+            known.chunks_in(chunks).next().is_some()
+        };
+        if self.stamps.iter().any(|stamp| reaches(stamp.region())) || self.known.is_some_and(is_known) {
             return false;
         }
         match self.source.bound(&region) {
@@ -76,20 +85,30 @@ impl LevelSource<'_> {
 ///
 /// ```
 /// use marchless::{
-///     LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion, Mesher,
+///     LeafBlock, LeafKey, LevelCover, LevelSettings, LevelSource, LevelViewer, MeshBuffer, MeshSettings, MeshUnion,
+///     Mesher,
 /// };
 ///
 /// // A planet of radius 100 around the origin, seen from above its north pole.
 /// let planet = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - 100.0;
 /// let cells = 16;
-/// let level_source = LevelSource { source: &planet, cells, spacing: 1.0, stamps: &[], planes: None, isovalue: 0.0 };
-/// let settings = LevelSettings { levels: 4, falloff: 2.0, view_distance: 20.0, ..LevelSettings::default() };
+/// let level_source = LevelSource {
+///     source: &planet,
+///     cells,
+///     spacing: 1.0,
+///     stamps: &[],
+///     known: None,
+///     planes: None,
+///     isovalue: 0.0,
+/// };
+/// let viewer = LevelViewer { position: [0.0, 7.0, 0.0], distance: 20.0 };
+/// let settings = LevelSettings { levels: 4, falloff: 2.0, ..LevelSettings::default() };
 /// // A chunk whose middle is farther from the surface than its corners are from its middle is empty.
 /// let is_empty = |leaf: LeafKey| {
 ///     let half = f64::from(cells << leaf.level) / 2.0;
 ///     planet(leaf.position.map(|v| (2.0 * f64::from(v) + 1.0) * half)).abs() > 1.75 * half + 4.0
 /// };
-/// let cover = LevelCover::new(&[[0.0, 7.0, 0.0]], &settings, None, is_empty)?;
+/// let cover = LevelCover::new(&[viewer], &settings, None, is_empty)?;
 ///
 /// let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::new(), MeshBuffer::new());
 /// let mut union = MeshUnion::new();
@@ -236,55 +255,69 @@ impl Filler<'_> {
         self.from.source.fill(&region, self.distances, &mut out.materials);
         out.weights.clear();
         out.weights.extend(self.distances.iter().map(|distance| i16::from_voxels(distance * width)));
-        self.apply_stamps(&region, out);
+        self.apply_edits(&region, out);
         if let Some(planes) = self.from.planes {
             let (weights, materials) = (&mut out.weights, &mut out.materials);
             Border::new(planes).clip_box(level, min, size, self.from.isovalue, weights, materials);
         }
     }
 
-    /// Applies the stamps to a box of the source's samples.
-    fn apply_stamps(&self, region: &SourceRegion, out: &mut SampleBox) {
-        let step = 1 << region.level;
+    /// Applies what has been edited to a box of the source's samples.
+    fn apply_edits(&self, region: &SourceRegion, out: &mut SampleBox) {
         let stamps: Vec<(Region, &QuantisedStamp)> = self.from.stamps.iter().map(|s| (s.region(), s)).collect();
-        let mut touched = Vec::new();
-        for (reach, _) in &stamps {
-            // The points of the level in reach, counted from the box's lowest.
-            let ranges = [0, 1, 2].map(|axis| {
-                let index = |v: i32| (v.saturating_add(step - 1).div_euclid(step)).saturating_sub(region.min[axis]);
-                let size = region.size[axis] as i32;
-                index(reach.min[axis]).clamp(0, size) as u32..index(reach.max[axis]).clamp(0, size) as u32
-            });
-            let [x, y, z] = ranges;
-            if !x.is_empty() && !y.is_empty() {
-                touched.extend(z.flat_map(|z| y.clone().map(move |y| [y, z])).map(|[y, z]| ([z, y], x.clone())));
-            }
-        }
-        // Rows that several stamps reach become one.
-        touched.sort_unstable_by_key(|(row, _)| *row);
-        touched.dedup_by(|(row, x), (kept, all)| {
-            let is_same = row == kept;
-            if is_same {
-                *all = all.start.min(x.start)..all.end.max(x.end);
-            }
-            is_same
-        });
-        for ([z, y], xs) in touched {
-            for x in xs {
+        let known = self.known_chunks(region);
+        let reaches = stamps.iter().map(|(reach, _)| *reach).enumerate();
+        // Known chunks come behind all stamps.
+        let mut touched: Vec<TouchedRow> = reaches
+            .chain(known.iter().map(|(reach, _)| (usize::MAX, *reach)))
+            .flat_map(|(edit, reach)| touched_rows(region, reach).map(move |(row, x)| TouchedRow { row, x, edit }))
+            .collect();
+        touched.sort_unstable_by_key(|touched| (touched.row, touched.edit));
+        for row in touched.chunk_by(|a, b| a.row == b.row) {
+            let [z, y] = row[0].row;
+            let (first, last) = row.iter().fold((u32::MAX, 0), |(a, b), t| (a.min(t.x.start), b.max(t.x.end)));
+            for x in (first..last).filter(|x| row.iter().any(|touched| touched.x.contains(x))) {
                 let index = out.index([x, y, z]);
-                let point = [x, y, z];
+                let (point, step) = ([x, y, z], 1 << region.level);
                 let at = [0, 1, 2].map(|k| region.min[k].saturating_add(point[k] as i32).saturating_mul(step));
                 let old = match region.level {
                     0 => Voxel::new(out.weights[index], out.materials[index]),
                     _ => self.finest(at),
                 };
-                let reaching = stamps.iter().filter(|(reach, _)| reach.contains(at));
-                let new = reaching.fold(old, |old, (_, stamp)| stamp.at_point(old, at));
+                let new = match known.iter().find(|(reach, _)| reach.contains(at)) {
+                    Some((reach, chunk)) => chunk.voxel(self.index_in(*reach, at)),
+                    None => {
+                        let here = row.iter().filter_map(|touched| stamps.get(touched.edit));
+                        here.filter(|(reach, _)| reach.contains(at))
+                            .fold(old, |old, (_, stamp)| stamp.at_point(old, at))
+                    }
+                };
                 if new != old {
                     (out.weights[index], out.materials[index]) = (new.weight, new.material);
                 }
             }
         }
+    }
+
+    /// The known chunks in a box of lattice points, each with its points.
+    fn known_chunks(&self, region: &SourceRegion) -> Vec<(Region, &GridChunk<i16>)> {
+        let Some(known) = self.from.known.filter(|known| known.chunk_cells() as i32 == self.cells) else {
+            return Vec::new();
+        };
+        let chunk = |axis: usize, point: u32| {
+            let point = (i64::from(region.min[axis]) + i64::from(point)) << region.level;
+            point.div_euclid(self.cells.into()).clamp(i32::MIN.into(), i64::from(i32::MAX) - 1) as i32
+        };
+        let last = |axis: usize| chunk(axis, region.size[axis].saturating_sub(1)) + 1;
+        let chunks = Region::new([0, 1, 2].map(|axis| chunk(axis, 0)), [0, 1, 2].map(last));
+        known.chunks_in(chunks).map(|(position, chunk)| (known.chunk_region(position), chunk)).collect()
+    }
+
+    /// The index of a lattice point's sample in the chunk that has these points.
+    const fn index_in(&self, chunk: Region, at: [i32; 3]) -> usize {
+        let n = self.cells as usize;
+        let [x, y, z] = [at[0] - chunk.min[0], at[1] - chunk.min[1], at[2] - chunk.min[2]];
+        x as usize + n * (y as usize + n * z as usize)
     }
 
     /// The source's sample of level 0 at one lattice point.
@@ -339,6 +372,30 @@ impl Filler<'_> {
     }
 }
 
+/// A row of points, `[z, y]`, and those of it that an edit reaches, counted from the box's lowest.
+struct TouchedRow {
+    row: [u32; 2],
+    x: Range<u32>,
+    /// The index of the stamp.
+    edit: usize,
+}
+
+/// The rows of a box that a box of lattice points of level 0 reaches.
+fn touched_rows(region: &SourceRegion, reach: Region) -> impl Iterator<Item = ([u32; 2], Range<u32>)> + use<> {
+    let step = 1 << region.level;
+    let (min, size) = (region.min, region.size);
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let index = |v: i32| (v.saturating_add(step - 1).div_euclid(step)).saturating_sub(min[axis]);
+        let size = size[axis] as i32;
+        index(reach.min[axis]).clamp(0, size) as u32..index(reach.max[axis]).clamp(0, size) as u32
+    });
+    let z = if x.is_empty() { 0..0 } else { z };
+    z.flat_map(move |z| {
+        let x = x.clone();
+        y.clone().map(move |y| ([z, y], x.clone()))
+    })
+}
+
 /// Points of a box along one axis that lie in the same chunks, borders included.
 struct Segment {
     points: Range<u32>,
@@ -348,7 +405,7 @@ struct Segment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Grid, GridChunk, LevelSettings, Operation, QuantisedShape};
+    use crate::{LevelSettings, LevelViewer, Operation, QuantisedShape};
 
     /// A point that stamps change has the sample of level 0 at every level, and any other the source's own.
     #[test]
@@ -371,13 +428,31 @@ mod tests {
         let mut edited = plain.clone();
         stamps.iter().for_each(|stamp| _ = edited.apply(stamp));
 
-        let from = LevelSource { source: &source, cells, spacing: 1.0, stamps: &stamps, planes: None, isovalue: 0.0 };
-        let settings =
-            LevelSettings { levels: 3, falloff: 1.75, view_distance: 30.0, extent, ..LevelSettings::default() };
-        let cover = LevelCover::new(&[[-7.5, 0.0, -7.5]], &settings, None, |_| false).unwrap();
+        let from = LevelSource {
+            source: &source,
+            cells,
+            spacing: 1.0,
+            stamps: &stamps,
+            known: None,
+            planes: None,
+            isovalue: 0.0,
+        };
+        // Some chunks are given by their samples, and the stamps are wrong there.
+        let mut known = Grid::<i16>::new(cells).unwrap();
+        for (position, chunk) in edited.chunks_in(extent).filter(|([x, _, z], _)| (x + z) % 2 == 0) {
+            known.insert(position, chunk.clone()).unwrap();
+        }
+        let half_known = LevelSource { known: Some(&known), ..from };
+        let settings = LevelSettings { levels: 3, falloff: 1.75, extent, ..LevelSettings::default() };
+        let viewer = LevelViewer { position: [-7.5, 0.0, -7.5], distance: 30.0 };
+        let cover = LevelCover::new(&[viewer], &settings, None, |_| false).unwrap();
         let (mut block, mut changed) = (LeafBlock::new(), [0; 3]);
         for (leaf, _) in cover.leaves() {
+            block.fill(&half_known, &cover, leaf);
+            let (own, faces) = (block.own.clone(), block.faces.clone());
             block.fill(&from, &cover, leaf);
+            let are_same = |a: &SampleBox, b: &SampleBox| a.weights == b.weights && a.materials == b.materials;
+            assert!(are_same(&own, &block.own) && faces.iter().zip(&block.faces).all(|(a, b)| are_same(a, b)));
             let corner = leaf.position.map(|v| v * cells as i32 - 1);
             for (index, at) in Region::new([0; 3], [cells as i32 + 3; 3]).points().enumerate() {
                 let point = [0, 1, 2].map(|axis| (corner[axis] + at[axis]) << leaf.level);

@@ -26,9 +26,18 @@ impl LevelChange {
     /// True if the two changes have leaves in common, or leaves that touch. Changes that do not overlap may be shown in
     /// any order.
     pub fn overlaps(&self, other: &Self) -> bool {
+        if !touch(&self.region(), &other.region()) {
+            return false;
+        }
         let touched = |change: &Self| change.leaves().map(|leaf| leaf.region()).collect::<Vec<_>>();
         let (ours, theirs) = (touched(self), touched(other));
         ours.iter().any(|a| theirs.iter().any(|b| touch(a, b)))
+    }
+
+    /// The box around all leaves that the change mentions, in chunks of level 0.
+    pub fn region(&self) -> Region {
+        let regions = self.leaves().map(LeafKey::region);
+        regions.reduce(|a, b| a.union(&b)).unwrap_or(Region::new([0; 3], [0; 3]))
     }
 
     /// All leaves that the change mentions.
@@ -228,7 +237,7 @@ impl LevelCover {
     }
 
     /// The leaves in some regions and those that touch them, in order, and whether each is empty.
-    fn leaves_touching(&self, regions: &[Region]) -> Vec<(LeafKey, bool)> {
+    pub(super) fn leaves_touching(&self, regions: &[Region]) -> Vec<(LeafKey, bool)> {
         let mut found = Vec::new();
         for region in regions {
             let roots = region.grown(1, 1);

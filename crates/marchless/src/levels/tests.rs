@@ -19,8 +19,12 @@ fn is_empty(key: LeafKey) -> bool {
     f64::from(min[1]) > ground + slack || f64::from(max[1]) < ground - slack
 }
 
-fn settings(levels: u8, falloff: f64, view_distance: f64) -> LevelSettings {
-    LevelSettings { levels, falloff, view_distance, extent: EXTENT, ..LevelSettings::default() }
+fn settings(levels: u8, falloff: f64) -> LevelSettings {
+    LevelSettings { levels, falloff, extent: EXTENT, ..LevelSettings::default() }
+}
+
+fn see(places: &[[f64; 3]], distance: f64) -> Vec<LevelViewer> {
+    places.iter().map(|&position| LevelViewer { position, distance }).collect()
 }
 
 /// Whether the boxes of two leaves have a face, an edge or a corner in common.
@@ -89,9 +93,9 @@ proptest! {
         (levels, falloff, view_distance) in (1..6u8, 1.75..4.0f64, 1.0..40.0f64),
         steps in prop::collection::vec((any::<prop::sample::Index>(), proptest::array::uniform3(-3.0..3.0f64)), 0..4),
     ) {
-        let (settings, mut viewers) = (settings(levels, falloff, view_distance), viewers);
+        let (settings, mut viewers) = (settings(levels, falloff), viewers);
         let mut calls = BTreeSet::new();
-        let mut cover = LevelCover::new(&viewers, &settings, None, |key| {
+        let mut cover = LevelCover::new(&see(&viewers, view_distance), &settings, None, |key| {
             assert!(calls.insert(key), "{key:?} was asked for twice");
             is_empty(key)
         })?;
@@ -100,9 +104,42 @@ proptest! {
             if let Some(viewer) = viewers.len().checked_sub(1).map(|last| which.index(last + 1)) {
                 viewers[viewer] = [0, 1, 2].map(|axis| viewers[viewer][axis] + offset[axis]);
             }
-            cover = LevelCover::new(&viewers, &settings, Some(&cover), is_empty)?;
+            cover = LevelCover::new(&see(&viewers, view_distance), &settings, Some(&cover), is_empty)?;
             check(&cover, &viewers, &settings)?;
         }
+    }
+
+    /// Edits put surfaces into empty leaves.
+    #[test]
+    fn filled_leaves_fit(
+        viewers in prop::collection::vec(viewer(), 1..3),
+        (levels, falloff, distance) in (1..6u8, 1.75..3.0f64, 1.0..40.0f64),
+        which in prop::collection::vec(any::<prop::sample::Index>(), 1..4),
+        dug in proptest::array::uniform3(any::<prop::sample::Index>()),
+    ) {
+        let (viewers, settings) = (see(&viewers, distance), settings(levels, falloff));
+        let cover = LevelCover::new(&viewers, &settings, None, is_empty)?;
+        let empty: Vec<LeafKey> = cover.leaves().filter(|(_, is_empty)| *is_empty).map(|(leaf, _)| leaf).collect();
+        prop_assume!(!empty.is_empty());
+        let filled: Vec<LeafKey> = which.iter().map(|index| *index.get(&empty)).collect();
+        // Within each, a single chunk gets a surface.
+        let chunk_in = |leaf: LeafKey| {
+            let Region { min, max } = leaf.region().intersection(&EXTENT);
+            [0, 1, 2].map(|axis| min[axis] + dug[axis].index((max[axis] - min[axis]) as usize) as i32)
+        };
+        let chunks: Vec<[i32; 3]> = filled.iter().map(|leaf| chunk_in(*leaf)).collect();
+        let is_filled = |key: LeafKey| chunks.iter().any(|chunk| key.region().contains(*chunk));
+        let change = cover.fill(&filled, &viewers, &settings, |key| is_empty(key) && !is_filled(key))?;
+        let mut now = cover.clone();
+        now.apply(&change);
+        check_leaves_of(&now, |leaf| !is_filled(leaf))?;
+        for chunk in &chunks {
+            let leaf = now.leaf_at(*chunk).expect("it is in view");
+            prop_assert!(now.leaves().any(|found| found == (leaf, false)));
+        }
+        // The viewers ask for the same.
+        let anew = LevelCover::new(&viewers, &settings, None, |key| is_empty(key) && !is_filled(key))?;
+        prop_assert!(anew.leaves().eq(now.leaves()));
     }
 
     /// Changes lead from one cover to another, and all covers between fit.
@@ -120,11 +157,11 @@ proptest! {
             _ => is_empty(key),
         };
         let [from_distance, to_distance] = distances.map(|distance| distance * f64::from(1u32 << (levels - 1)));
-        let settings = |distance| settings(levels, falloff, distance);
-        let start = LevelCover::new(&from, &settings(from_distance), None, is_empty)?;
-        let target = LevelCover::new(&to, &settings(to_distance), None, is_empty_then)?;
+        let settings = settings(levels, falloff);
+        let start = LevelCover::new(&see(&from, from_distance), &settings, None, is_empty)?;
+        let target = LevelCover::new(&see(&to, to_distance), &settings, None, is_empty_then)?;
         let changes = start.changes_to(&target).expect("the numbers of levels are the same");
-        let mut now = start.clone();
+        let (mut now, mut most) = (start.clone(), start.reachable().count());
         let drawn = |cover: &LevelCover| -> BTreeMap<LeafKey, (bool, FinerNeighbours)> {
             cover.leaves().map(|(leaf, is_empty)| (leaf, (is_empty, cover.finer_neighbours(leaf)))).collect()
         };
@@ -160,6 +197,7 @@ proptest! {
                 map.values_mut().filter(|(is_empty, _)| *is_empty).for_each(|leaf| leaf.1 = FinerNeighbours::NONE);
             }
             prop_assert_eq!(&shown, &expected);
+            most = most.max(now.reachable().count());
         }
         prop_assert_eq!(drawn(&now), drawn(&target));
         // The way out where no single step fits.
@@ -168,13 +206,14 @@ proptest! {
             once.apply(&change);
         }
         prop_assert_eq!(drawn(&once), drawn(&target));
-        prop_assert!(now.nodes.len() < 64 || now.nodes.len() <= 2 * now.reachable().count() + 16);
+        // Nodes that cannot be reached do not pile up.
+        prop_assert!(now.nodes.len() <= 2 * most + 80, "{} of {most} nodes", now.nodes.len());
     }
 
     /// All chunks that a viewer sees, and no other, at one level.
     #[test]
     fn one_level_is_a_ball_of_chunks(viewer in [-40.0..48.0f64, -24.0..17.0f64, -33.0..40.0f64], distance in 0.5..9.0f64) {
-        let cover = LevelCover::new(&[viewer], &settings(1, 3.0, distance), None, is_empty)?;
+        let cover = LevelCover::new(&see(&[viewer], distance), &settings(1, 3.0), None, is_empty)?;
         for chunk in EXTENT.points().step_by(3) {
             let key = LeafKey { level: 0, position: chunk };
             let expected = (distance_squared(viewer, key) < distance * distance).then_some(key);
@@ -186,13 +225,13 @@ proptest! {
     #[test]
     fn small_steps_change_nothing(viewer in viewer(), offset in proptest::array::uniform3(-0.05..0.05f64)) {
         // A step of less than 0.1 is less than the hysteresis of the finest leaves that can be merged.
-        let settings = settings(5, 2.0, 30.0);
+        let settings = settings(5, 2.0);
         let there = [0, 1, 2].map(|axis| viewer[axis] + offset[axis]);
-        let first = LevelCover::new(&[viewer], &settings, None, is_empty)?;
-        let second = LevelCover::new(&[there], &settings, Some(&first), is_empty)?;
+        let first = LevelCover::new(&see(&[viewer], 30.0), &settings, None, is_empty)?;
+        let second = LevelCover::new(&see(&[there], 30.0), &settings, Some(&first), is_empty)?;
         let mut former = second;
         for place in [viewer, there, viewer] {
-            let cover = LevelCover::new(&[place], &settings, Some(&former), is_empty)?;
+            let cover = LevelCover::new(&see(&[place], 30.0), &settings, Some(&former), is_empty)?;
             let [now, before] = [&cover, &former].map(|cover| cover.leaves().collect::<BTreeSet<_>>());
             prop_assert_eq!(now, before);
             former = cover;
@@ -203,12 +242,12 @@ proptest! {
 #[test]
 fn two_viewers_make_diagonal_leaves_split_further() {
     // Without an extent and with a surface everywhere: viewers across from each other along a diagonal of an edge.
-    let settings = LevelSettings { levels: 3, falloff: 1.75, view_distance: 9.0, hysteresis: 0.0, extent: EXTENT };
+    let settings = LevelSettings { hysteresis: 0.0, ..settings(3, 1.75) };
     let mut splits = 0;
     for step in 0..60 {
         let at = f64::from(step) / 10.0;
         let viewers = [[at, 0.5, at], [at - 7.0, 0.5, at - 7.0]];
-        let cover = LevelCover::new(&viewers, &settings, None, |_| false).unwrap();
+        let cover = LevelCover::new(&see(&viewers, 9.0), &settings, None, |_| false).unwrap();
         let drawn: Vec<LeafKey> = cover.leaves().map(|(leaf, _)| leaf).collect();
         for &leaf in &drawn {
             assert_eq!(cover.finer_neighbours(leaf).alternating_edge(), None);
@@ -231,7 +270,7 @@ fn two_viewers_make_diagonal_leaves_split_further() {
 
 #[test]
 fn covers_of_other_numbers_of_levels_have_no_way_between() {
-    let cover = |levels| LevelCover::new(&[[0.0; 3]], &settings(levels, 2.0, 9.0), None, is_empty).unwrap();
+    let cover = |levels| LevelCover::new(&see(&[[0.0; 3]], 9.0), &settings(levels, 2.0), None, is_empty).unwrap();
     assert_eq!(cover(2).changes_to(&cover(3)), None);
     assert_eq!(cover(3).changes_to(&cover(3)), Some(Vec::new()));
 }
@@ -240,7 +279,8 @@ fn covers_of_other_numbers_of_levels_have_no_way_between() {
 fn bad_settings_are_refused() {
     let good = LevelSettings::default();
     let refusal = |settings: LevelSettings, viewer: f64| {
-        LevelCover::new(&[[viewer, 0.0, 0.0]], &settings, None, |_| true).expect_err("the settings are bad").to_string()
+        let viewers = see(&[[viewer, 0.0, 0.0]], 9.0);
+        LevelCover::new(&viewers, &settings, None, |_| true).expect_err("the settings are bad").to_string()
     };
     for levels in [0, 8] {
         let expected = alloc::format!("a cover has 1 to 7 levels, but {levels} were asked for");
@@ -250,25 +290,41 @@ fn bad_settings_are_refused() {
         let expected = alloc::format!("falloff must be 1.75 or more, but it is {falloff}");
         assert_eq!(refusal(LevelSettings { falloff, ..good }, 0.0), expected);
     }
-    for view_distance in [f64::NAN, 0.0, f64::INFINITY] {
-        let expected = alloc::format!("view_distance must be above 0, but it is {view_distance}");
-        assert_eq!(refusal(LevelSettings { view_distance, ..good }, 0.0), expected);
+    for distance in [f64::NAN, 0.0, -1.0] {
+        let expected = alloc::format!("a viewer's distance must be above 0, but it is {distance}");
+        let refused = LevelCover::new(&see(&[[0.0; 3]], distance), &good, None, |_| true);
+        assert_eq!(refused.expect_err("it sees nothing").to_string(), expected);
     }
     for hysteresis in [f64::NAN, -0.1, 1.1] {
         let expected = alloc::format!("hysteresis must be from 0 to 1, but it is {hysteresis}");
         assert_eq!(refusal(LevelSettings { hysteresis, ..good }, 0.0), expected);
     }
     assert_eq!(refusal(good, f64::NAN), "viewers must be at finite places, but one is at [NaN, 0.0, 0.0]");
-    for settings in [
-        LevelSettings { view_distance: 1e300, ..good },
-        LevelSettings { levels: 1, view_distance: 200.0, ..good },
-        LevelSettings { falloff: 1e9, view_distance: 1e4, ..good },
+    for (settings, distance) in [
+        (good, 1e300),
+        (good, f64::INFINITY),
+        (LevelSettings { levels: 1, ..good }, 200.0),
+        (LevelSettings { falloff: 1e9, ..good }, 1e4),
+        (LevelSettings { kept: good.extent, ..good }, 1.0),
     ] {
-        let found = LevelCover::new(&[[0.0; 3]], &settings, None, |_| false).expect_err("there are too many");
+        let viewers = see(&[[0.0; 3]], distance);
+        let found = LevelCover::new(&viewers, &settings, None, |_| false).expect_err("there are too many");
         assert_eq!(found, LevelError::TooManyLeaves);
     }
     // No viewer sees nothing; a viewer far outside the lattice sees nothing either.
-    for viewers in [&[][..], &[[1e300; 3]]] {
-        assert_eq!(LevelCover::new(viewers, &good, None, |_| false).unwrap().leaves().count(), 0);
+    for viewers in [Vec::new(), see(&[[1e300; 3]], 100.0)] {
+        assert_eq!(LevelCover::new(&viewers, &good, None, |_| false).unwrap().leaves().count(), 0);
     }
+}
+
+#[test]
+fn what_is_kept_needs_no_viewer() {
+    let kept = Region::new([-3, -2, 5], [4, 1, 9]);
+    let settings = LevelSettings { kept, ..settings(4, 2.0) };
+    let nobody = LevelCover::new(&[], &settings, None, is_empty).unwrap();
+    assert!(EXTENT.points().all(|chunk| !kept.contains(chunk) || nobody.leaf_at(chunk).is_some()));
+    assert!(nobody.leaves().all(|(leaf, _)| leaf.level == 3));
+    // Whoever sees infinitely far sees all that exists.
+    let all = LevelCover::new(&see(&[[2.0; 3]], f64::INFINITY), &settings, None, is_empty).unwrap();
+    assert!(EXTENT.points().all(|chunk| all.leaf_at(chunk).is_some()));
 }

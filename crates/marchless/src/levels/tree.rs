@@ -53,9 +53,9 @@ impl LevelCover {
         })
     }
 
-    /// Drops the nodes that cannot be reached any more, once they are the most.
+    /// Drops the nodes that cannot be reached any more, once there may be as many as others.
     pub(super) fn compact(&mut self) {
-        if self.nodes.len() < 64 || 2 * self.reachable().count() > self.nodes.len() {
+        if self.nodes.len() < self.compact_at.max(64) {
             return;
         }
         let former = core::mem::take(&mut self.nodes);
@@ -72,5 +72,6 @@ impl LevelCover {
                 to_copy.extend((0..8).map(|child| (first + child, copied + child)));
             }
         }
+        self.compact_at = 2 * self.nodes.len();
     }
 }

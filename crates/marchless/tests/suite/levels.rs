@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use fastrand::Rng;
 use marchless::{
-    LeafError, LeafKey, LevelCover, LevelSettings, MeshBuffer, MeshReport, MeshSettings, MeshUnion, Mesher, Region,
-    Topology,
+    LeafError, LeafKey, LevelCover, LevelSettings, LevelViewer, MeshBuffer, MeshReport, MeshSettings, MeshUnion,
+    Mesher, Region, Topology,
 };
 
 use crate::support::TestWeight;
@@ -126,10 +126,13 @@ fn covers_of_viewers_are_closed() {
     let (cells, size, field) = (4, [16, 16, 16], Field::<i16>::hills());
     let extent = Region::new([0; 3], size);
     for _ in 0..12 {
-        let viewers: Vec<[f64; 3]> = (0..random.usize(1..4))
-            .map(|_| [16.0 * random.f64(), 6.0 + 4.0 * random.f64(), 16.0 * random.f64()])
+        let viewers: Vec<LevelViewer> = (0..random.usize(1..4))
+            .map(|_| LevelViewer {
+                position: [16.0 * random.f64(), 6.0 + 4.0 * random.f64(), 16.0 * random.f64()],
+                distance: 40.0,
+            })
             .collect();
-        let settings = LevelSettings { levels: 4, falloff: 1.75, view_distance: 40.0, extent, ..Default::default() };
+        let settings = LevelSettings { levels: 4, falloff: 1.75, extent, ..Default::default() };
         let levels = LevelCover::new(&viewers, &settings, None, |leaf| {
             let Region { min, max } = leaf.region();
             // The extent's border has walls where it cuts the ground.

@@ -2,8 +2,8 @@
 
 use fastrand::Rng;
 use marchless::{
-    Bound, Grid, GridChunk, LeafBlock, LevelCover, LevelSettings, LevelSource, MeshBuffer, MeshSettings, MeshUnion,
-    Mesher, Operation, QuantisedShape, QuantisedStamp, Region, Source, SourceRegion,
+    Bound, Grid, GridChunk, LeafBlock, LevelCover, LevelSettings, LevelSource, LevelViewer, MeshBuffer, MeshSettings,
+    MeshUnion, Mesher, Operation, QuantisedShape, QuantisedStamp, Region, Source, SourceRegion,
 };
 
 use crate::support::random;
@@ -90,10 +90,15 @@ fn whole_covers_are_closed() {
                 QuantisedStamp::new(shape, operation, random.u8(5..9)).with_isovalue(isovalue)
             })
             .collect();
-        let source = LevelSource { source: &bumps, cells, spacing: 1.0, stamps: &stamps, planes, isovalue };
-        let settings = LevelSettings { levels: 4, falloff: 1.75, view_distance: 40.0, ..LevelSettings::default() };
-        let viewers: Vec<[f64; 3]> =
-            (0..random.usize(1..4)).map(|_| [(); 3].map(|()| (random.f64() - 0.5) * 80.0 / f64::from(cells))).collect();
+        let source =
+            LevelSource { source: &bumps, cells, spacing: 1.0, stamps: &stamps, known: None, planes, isovalue };
+        let settings = LevelSettings { levels: 4, falloff: 1.75, ..LevelSettings::default() };
+        let viewers: Vec<LevelViewer> = (0..random.usize(1..4))
+            .map(|_| LevelViewer {
+                position: [(); 3].map(|()| (random.f64() - 0.5) * 80.0 / f64::from(cells)),
+                distance: 40.0,
+            })
+            .collect();
         let cover = LevelCover::new(&viewers, &settings, None, |leaf| source.is_empty(leaf));
         let cover = cover.expect("the settings are sound");
         let levels: Vec<u8> = cover.leaves().filter(|(_, empty)| !empty).map(|(leaf, _)| leaf.level).collect();
@@ -113,10 +118,18 @@ fn leaves_of_level_0_are_chunks_of_a_grid() {
     for position in chunks.points() {
         grid.insert(position, GridChunk::from_source(&bumps, position, 8, 1.0)).expect("it is within the bounds");
     }
-    let source =
-        LevelSource { source: &bumps, cells: 8, spacing: 1.0, stamps: &[], planes: grid.planes(), isovalue: 0.0 };
-    let settings = LevelSettings { levels: 1, view_distance: 30.0, extent: chunks, ..LevelSettings::default() };
-    let cover = LevelCover::new(&[[0.0; 3]], &settings, None, |_| false).expect("the settings are sound");
+    let source = LevelSource {
+        source: &bumps,
+        cells: 8,
+        spacing: 1.0,
+        stamps: &[],
+        known: None,
+        planes: grid.planes(),
+        isovalue: 0.0,
+    };
+    let settings = LevelSettings { levels: 1, extent: chunks, ..LevelSettings::default() };
+    let cover = LevelCover::new(&[LevelViewer { position: [0.0; 3], distance: 30.0 }], &settings, None, |_| false)
+        .expect("the settings are sound");
     let (mut mesher, mut block) = (Mesher::new(), LeafBlock::new());
     let (mut found, mut expected, mut drawn) = (MeshBuffer::new(), MeshBuffer::new(), 0);
     for (leaf, _) in cover.leaves() {
@@ -133,9 +146,11 @@ fn leaves_of_level_0_are_chunks_of_a_grid() {
 #[test]
 fn samples_are_in_voxels_of_level_0() {
     let slope = |[x, y, z]: [f64; 3]| (3.0 * x - 2.0 * y + 6.0 * z) / 7.0 - 5.0;
-    let source = LevelSource { source: &slope, cells: 6, spacing: 1.0, stamps: &[], planes: None, isovalue: 0.0 };
-    let settings = LevelSettings { levels: 7, falloff: 1.75, view_distance: 200.0, ..LevelSettings::default() };
-    let cover = LevelCover::new(&[[0.3; 3]], &settings, None, |_| false).expect("the settings are sound");
+    let source =
+        LevelSource { source: &slope, cells: 6, spacing: 1.0, stamps: &[], known: None, planes: None, isovalue: 0.0 };
+    let settings = LevelSettings { levels: 7, falloff: 1.75, ..LevelSettings::default() };
+    let cover = LevelCover::new(&[LevelViewer { position: [0.3; 3], distance: 200.0 }], &settings, None, |_| false)
+        .expect("the settings are sound");
     let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::new(), MeshBuffer::new());
     let mut levels = [0; 7];
     for (leaf, _) in cover.leaves() {
