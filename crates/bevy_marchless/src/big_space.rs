@@ -139,7 +139,7 @@ fn leave_removed_grid(
     let Ok((volume, children)) = terrains.get(removed.entity) else { return };
     let Some(settings) = volume.settings() else { return };
     for (entity, chunk) in chunks.iter_many(children) {
-        let transform = chunk_transform(chunk.position.to_array(), settings.chunk_cells, settings.voxel_size);
+        let transform = chunk_transform(chunk.key(), settings.chunk_cells, settings.voxel_size);
         commands.entity(entity).try_remove::<(CellCoord, Stationary)>().try_insert(transform);
     }
 }

@@ -9,7 +9,7 @@ use bevy_ecs::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::MeshBuffer;
+use marchless::{LeafKey, MeshBuffer};
 
 /// One chunk of a terrain, on its own entity, a child of the terrain.
 ///
@@ -27,10 +27,16 @@ pub struct Chunk {
     /// The terrain's entity.
     #[entities]
     pub terrain: Entity,
-    /// The chunk's level of detail; 0 is the finest, and currently the only one.
+    /// The chunk's level of detail; 0 is the finest. A chunk of level `k` is as wide as 2ᵏ chunks of level 0.
     pub level: u8,
     /// The chunk's position in the terrain, in chunks of its level; may be negative.
     pub position: IVec3,
+}
+
+impl Chunk {
+    pub(crate) const fn key(&self) -> ChunkKey {
+        ChunkKey { level: self.level, position: self.position.to_array() }
+    }
 }
 
 /// The level and position of a chunk.
@@ -51,6 +57,18 @@ impl Hash for ChunkKey {
     }
 }
 
+impl From<LeafKey> for ChunkKey {
+    fn from(LeafKey { level, position }: LeafKey) -> Self {
+        Self { level, position }
+    }
+}
+
+impl From<ChunkKey> for LeafKey {
+    fn from(ChunkKey { level, position }: ChunkKey) -> Self {
+        Self { level, position }
+    }
+}
+
 impl ChunkKey {
     /// The key of a chunk of the finest level.
     pub(crate) const fn finest(position: [i32; 3]) -> Self {
@@ -68,7 +86,7 @@ impl ChunkKey {
     }
 }
 
-/// The mesh of a chunk as shown now, in voxels from the chunk's lowest corner. It exists without a renderer.
+/// The mesh of a chunk as shown now, in voxels of its level from the chunk's lowest corner. It exists without a renderer.
 ///
 /// Empty if nothing is left to draw, because everything was dug away. Where `Assets<Mesh>` exists, the entity's
 /// `Mesh3d` holds the same mesh.
@@ -82,23 +100,16 @@ pub struct ChunkGeometry {
 }
 
 /// The bundle of a new chunk, without its mesh.
-pub(crate) fn new_chunk(
-    terrain: Entity,
-    ChunkKey { level, position }: ChunkKey,
-    cells: u32,
-    voxel_size: f32,
-) -> impl Bundle {
-    (
-        Chunk { terrain, level, position: position.into() },
-        chunk_transform(position, cells, voxel_size),
-        ChildOf(terrain),
-    )
+pub(crate) fn new_chunk(terrain: Entity, key: ChunkKey, cells: u32, voxel_size: f32) -> impl Bundle {
+    let ChunkKey { level, position } = key;
+    (Chunk { terrain, level, position: position.into() }, chunk_transform(key, cells, voxel_size), ChildOf(terrain))
 }
 
-/// The transform from a chunk's own space, in voxels, to the terrain's.
-pub(crate) fn chunk_transform(position: [i32; 3], cells: u32, voxel_size: f32) -> Transform {
-    let corner = IVec3::from(position).as_dvec3() * f64::from(cells) * f64::from(voxel_size);
-    Transform::from_translation(corner.as_vec3()).with_scale(Vec3::splat(voxel_size))
+/// The transform from a chunk's own space, in voxels of its level, to the terrain's.
+pub(crate) fn chunk_transform(ChunkKey { level, position }: ChunkKey, cells: u32, voxel_size: f32) -> Transform {
+    let size = voxel_size * f32::from(1u8 << level.min(7));
+    let corner = IVec3::from(position).as_dvec3() * f64::from(cells) * f64::from(size);
+    Transform::from_translation(corner.as_vec3()).with_scale(Vec3::splat(size))
 }
 
 /// The bounding box of a whole chunk, in voxels.

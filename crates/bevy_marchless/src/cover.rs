@@ -19,7 +19,7 @@ use rows::Borders;
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[reflect(Debug, PartialEq, Hash, Clone)]
 pub struct Leaf {
-    /// The level of detail; 0 is the finest, and at present the only one.
+    /// The level of detail; 0 is the finest. A chunk of level `k` is as wide as 2ᵏ chunks of level 0.
     pub level: u8,
     /// The chunk's position, in chunks of this level.
     pub position: IVec3,
@@ -97,6 +97,22 @@ impl Cover {
     /// The view of one viewer.
     pub(crate) fn view(&self, id: ViewId) -> Option<&View> {
         Some(&self.views.get(&id)?.view)
+    }
+
+    /// All views.
+    pub(crate) fn views(&self) -> impl Iterator<Item = (ViewId, View)> + '_ {
+        self.views.iter().map(|(id, tracked)| (*id, tracked.view))
+    }
+
+    /// Changes the view of one viewer, for the urgency of chunks alone: no chunk is reported.
+    pub(crate) fn set_quietly(&mut self, id: ViewId, view: Option<View>) {
+        match view {
+            Some(view) => {
+                let tracked = TrackedView { view, borders: Borders::default(), revealed: 1.0, hidden: 0 };
+                self.views.insert(id, tracked);
+            }
+            None => _ = self.views.remove(&id),
+        }
     }
 
     /// Whether samples that nothing needs at present may be dropped.

@@ -12,7 +12,7 @@ use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
 use bevy_transform::components::GlobalTransform;
 
-use crate::chunk::{Chunk, ChunkGeometry, chunk_transform};
+use crate::chunk::{Chunk, ChunkGeometry, ChunkKey, chunk_transform};
 use crate::cover::LeafState;
 use crate::terrain::TerrainVolume;
 
@@ -99,9 +99,9 @@ fn draw_others(volumes: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos: G
         let cells = settings.chunk_cells;
         let middle = Vec3::splat(0.5 * cells as f32);
         let mark = 0.5 * EMPTY_SHARE * cells as f32;
-        for leaf in volume.heart().table().keys().filter_map(|key| volume.leaf_at(IVec3::from(key.position))) {
-            let transform =
-                to_world.mul_transform(chunk_transform(leaf.position.to_array(), cells, settings.voxel_size));
+        for leaf in volume.heart().leaves() {
+            let key = ChunkKey { level: leaf.level, position: leaf.position.to_array() };
+            let transform = to_world.mul_transform(chunk_transform(key, cells, settings.voxel_size));
             match leaf.state {
                 LeafState::Drawn => {}
                 LeafState::Waiting => gizmos.aabb_3d(inset(cells), transform, waiting),

@@ -18,6 +18,8 @@ use bevy_tasks::{AsyncComputeTaskPool, futures_lite::future::yield_now};
 pub(crate) enum Priority {
     /// Meshing edited chunks.
     Edit,
+    /// Planning changes of levels of detail.
+    Plan,
     /// Meshing chunks again for new settings.
     Restyle,
     /// Meshing a chunk for the first time.

@@ -5,7 +5,8 @@
 //! claimed. Edits of claimed chunks wait, become one set, and start from the newest samples when the group is done. So
 //! results arrive in order by construction, and a stroke that never pauses is shown while it goes on.
 //!
-//! A chunk that has never been drawn is a group of its own, and gives way to edits.
+//! A chunk that has never been drawn is a group of its own, and gives way to edits. With several levels of detail,
+//! leaves come and go by changes of levels instead, each shown in one update.
 
 mod job;
 mod pool;
@@ -35,7 +36,8 @@ use crate::schedule::{MakesMeshes, MarchlessSettings, UpdatePhase};
 use crate::stats::TerrainStats;
 use crate::terrain::TerrainVolume;
 use crate::volume::{
-    ChunkMesh, Colors, DrawnMesh, Heart, MeshResult, PreparedGroup, Restyle, Restyled, ShowTarget, Shown, Swap,
+    ChunkMesh, Colors, DrawnMesh, Heart, LevelJobs, MeshResult, PreparedGroup, Restyle, Restyled, ShowTarget, Shown,
+    Swap,
 };
 
 /// The vertex attribute with a vertex's material, a `u32`, for shaders.
@@ -179,12 +181,16 @@ impl MeshUpdate<'_, '_, '_> {
     /// Does all meshing and showing of one terrain.
     fn mesh(&mut self, terrain: &mut MeshedTerrain) {
         self.take_results(terrain);
+        terrain.heart.take_plan();
         let start = Instant::now();
         while let Some(prepared) = terrain.heart.next_changed() {
             self.start(terrain, prepared);
         }
+        self.show_level_changes(terrain, true);
         let edits = start.elapsed();
         (self.edits, self.until) = (self.edits + edits, self.until + edits);
+        self.show_level_changes(terrain, false);
+        self.start_level_changes(terrain);
         terrain.heart.sort_ready(self.until);
         self.first_meshes(terrain);
         self.restyle(terrain);
@@ -217,6 +223,52 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
+    /// Shows changes of levels that are meshed; with `urgent`, those that edits have made.
+    fn show_level_changes(&mut self, terrain: &mut MeshedTerrain, urgent: bool) {
+        let mut done = 0;
+        while (urgent || done == 0 || self.bytes <= self.max_upload_bytes && Instant::now() < self.until)
+            && let Some((change, inputs)) = terrain.heart.next_level_change(urgent)
+        {
+            let (settings, style) = (terrain.heart.mesh_settings(), self.presenter.style(terrain.heart.colors()));
+            let at_once = mesh_now(&inputs, &settings, style.as_ref(), &self.presenter.pool);
+            at_once.iter().for_each(|meshed| self.presenter.stats.count_mesh(meshed.time));
+            drop(inputs);
+            let shown = terrain.heart.show_level_change(change, at_once);
+            if !urgent {
+                let entities = (shown.swaps.len() + terrain.heart.table().released_len()) as u32;
+                self.until = self.until.checked_sub(ENTITY_TIME * entities).unwrap_or(self.until);
+            }
+            self.show(terrain, shown);
+            for entity in terrain.heart.take_released() {
+                self.presenter.commands.entity(entity).try_despawn();
+            }
+            done += 1;
+        }
+    }
+
+    /// Starts changes of levels, and the meshes of those whose samples are there.
+    fn start_level_changes(&mut self, terrain: &mut MeshedTerrain) {
+        terrain.heart.start_level_changes();
+        let mut done = 0;
+        while (done == 0 || Instant::now() < self.until)
+            && let Some(jobs) = terrain.heart.next_level_jobs(self.in_flight)
+        {
+            let (change, attempt, urgency) = (jobs.change, jobs.attempt(), jobs.urgency);
+            let settings = terrain.heart.mesh_settings();
+            let style = self.presenter.style(terrain.heart.colors());
+            let job = |(key, input)| {
+                let (results, style) = (terrain.heart.mesh_results().clone(), style.clone());
+                self.queue.push(Priority::FirstMesh(urgency), move || {
+                    let meshed = mesh_chunk(&input, key, &settings, style.as_ref(), None);
+                    results.push(MeshResult::OfLevels(LevelJobs::result(change, attempt, meshed)));
+                })
+            };
+            let tickets = jobs.inputs.into_iter().map(job).collect();
+            terrain.heart.started_level_jobs(change, tickets);
+            done += 1;
+        }
+    }
+
     /// Starts the first meshes of chunks, one by one, the most urgent first.
     fn first_meshes(&mut self, terrain: &mut MeshedTerrain) {
         let mut done = 0;
@@ -241,7 +293,7 @@ impl MeshUpdate<'_, '_, '_> {
                     let (results, style) = (terrain.heart.mesh_results().clone(), style.clone());
                     terrain.heart.start_recolor(group, |id| {
                         self.queue.push(Priority::Restyle, move || {
-                            results.push(MeshResult::OfGroup(id, recolor(key.position, geometry, style.as_ref())));
+                            results.push(MeshResult::OfGroup(id, recolor(key, geometry, style.as_ref())));
                         })
                     });
                 }
@@ -259,11 +311,11 @@ impl MeshUpdate<'_, '_, '_> {
         while (done == 0 || Instant::now() < self.until)
             && let Some((key, job, settings)) = terrain.heart.next_in_transition(self.in_flight)
         {
-            let samples = terrain.heart.samples().neighbourhood(key.position).to_neighbourhood();
+            let input = terrain.heart.mesh_input(key);
             let style = self.presenter.style(terrain.heart.colors());
             let (results, appearance) = (terrain.heart.mesh_results().clone(), terrain.heart.appearance());
             let ticket = self.queue.push(Priority::Restyle, move || {
-                let meshed = mesh_chunk(&samples.view(), key.position, &settings, style.as_ref(), None);
+                let meshed = mesh_chunk(&input, key, &settings, style.as_ref(), None);
                 results.push(MeshResult::Restyled(Restyled { job, meshed, appearance }));
             });
             terrain.heart.started_in_transition(key, job, ticket);
@@ -275,8 +327,8 @@ impl MeshUpdate<'_, '_, '_> {
     fn end_transition(&mut self, terrain: &mut MeshedTerrain) {
         let style = self.presenter.style(terrain.heart.colors());
         while let Some((key, _, settings)) = terrain.heart.next_in_transition(usize::MAX) {
-            let samples = [(key.position, terrain.heart.samples().neighbourhood(key.position))];
-            let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.presenter.pool);
+            let input = terrain.heart.mesh_input(key);
+            let meshed = mesh_now(&[(key, input)], &settings, style.as_ref(), &self.presenter.pool);
             for meshed in meshed {
                 self.presenter.stats.count_mesh(meshed.time);
                 terrain.heart.meshed_in_transition(meshed);
@@ -296,12 +348,10 @@ impl MeshUpdate<'_, '_, '_> {
         self.inline_left -= count;
         let (settings, mut group) = (terrain.heart.mesh_settings(), prepared.group);
         let style = self.presenter.style(terrain.heart.colors());
-        let samples: Vec<_> = prepared
-            .to_mesh
-            .iter()
-            .map(|position| (*position, terrain.heart.samples().neighbourhood(*position)))
-            .collect();
-        let meshed = mesh_now(&samples, &settings, style.as_ref(), &self.presenter.pool);
+        let inputs: Vec<_> = prepared.to_mesh.iter().map(|key| (*key, terrain.heart.mesh_input(*key))).collect();
+        let meshed = mesh_now(&inputs, &settings, style.as_ref(), &self.presenter.pool);
+        // What holds samples while they are shown keeps their memory from being reused.
+        drop(inputs);
         self.presenter.pool.prepare(meshed.iter().map(|meshed| &*meshed.geometry), style.is_some());
         for meshed in meshed {
             self.presenter.stats.count_mesh(meshed.time);
@@ -319,11 +369,11 @@ impl MeshUpdate<'_, '_, '_> {
         }
         let (results, settings) = (terrain.heart.mesh_results().clone(), terrain.heart.mesh_settings());
         let style = self.presenter.style(terrain.heart.colors());
-        terrain.heart.start(prepared, |heart, id, position| {
-            let samples = heart.samples().neighbourhood(position).to_neighbourhood();
+        terrain.heart.start(prepared, |heart, id, key| {
+            let input = heart.mesh_input(key);
             let (results, style) = (results.clone(), style.clone());
             self.queue.push(priority, move || {
-                let meshed = mesh_chunk(&samples.view(), position, &settings, style.as_ref(), None);
+                let meshed = mesh_chunk(&input, key, &settings, style.as_ref(), None);
                 results.push(MeshResult::OfGroup(id, meshed));
             })
         });

@@ -2,6 +2,7 @@
 
 mod extent;
 mod handle;
+mod levels;
 mod prepare;
 mod volume;
 
@@ -17,6 +18,7 @@ use thiserror::Error;
 
 pub use extent::{Extent, Keep};
 pub use handle::{SourceHandle, TerrainSources};
+pub use levels::TerrainLevels;
 pub use volume::TerrainVolume;
 
 use crate::chunk::{Chunk, ChunkGeometry};
@@ -35,6 +37,8 @@ use crate::volume::SamplingSettings;
 ///
 /// Changing `source`, `chunk_cells` or `voxel_size` fills the terrain anew and discards all edits. The world under way
 /// is shown before the newest settings take effect, however often they change. Stamps wait for it.
+///
+/// Other `levels` draw all chunks anew; edits stay. With several levels, another source or extent does so too.
 ///
 /// Changing `extent` or `keep` loads and unloads chunks. Chunks that stay inside the extent keep their state, and edits
 /// come back with their chunks, even where a brush reached across the border. Another `isovalue` shows in one update,
@@ -64,6 +68,8 @@ pub struct Terrain {
     pub extent: Extent,
     /// The chunks of the extent that are loaded even without a viewer; at most [`Terrain::MAX_CHUNKS`]. Default: all.
     pub keep: Keep,
+    /// How detail falls off with distance. Default: it does not; there is one level.
+    pub levels: TerrainLevels,
     /// Cells of a chunk per axis, from 8 to 62. Default 32.
     pub chunk_cells: u32,
     /// The distance between neighbouring samples, in world units; above 0. Default 1.
@@ -91,6 +97,7 @@ impl Terrain {
         Self {
             extent: UVec3::new(8, 4, 8).into(),
             keep: Keep::Everything,
+            levels: TerrainLevels::default(),
             chunk_cells: DEFAULT_CHUNK_CELLS,
             voxel_size: 1.0,
             isovalue: 0.0,
@@ -115,6 +122,12 @@ impl Terrain {
     #[must_use]
     pub fn with_keep(self, keep: Keep) -> Self {
         Self { keep, ..self }
+    }
+
+    /// Sets how detail falls off with distance: a number of levels, or [`TerrainLevels`].
+    #[must_use]
+    pub fn with_levels(self, levels: impl Into<TerrainLevels>) -> Self {
+        Self { levels: levels.into(), ..self }
     }
 
     /// Sets the number of cells of a chunk per axis.
@@ -182,6 +195,7 @@ impl Terrain {
         if kept > u128::from(Self::MAX_CHUNKS) {
             return Err(TerrainError::Keep { found: u64::try_from(kept).unwrap_or(u64::MAX) });
         }
+        self.levels.check()?;
         if !(self.voxel_size > 0.0 && self.voxel_size.is_finite()) {
             return Err(TerrainError::VoxelSize { found: self.voxel_size });
         }
@@ -230,7 +244,7 @@ impl Terrain {
         if self.chunk_cells == other.chunk_cells {
             (self.extent, self.keep) = (other.extent, other.keep);
         }
-        (self.isovalue, self.normals) = (other.isovalue, other.normals);
+        (self.isovalue, self.normals, self.levels) = (other.isovalue, other.normals, other.levels);
         self.palette.clone_from(&other.palette);
     }
 }
@@ -282,6 +296,24 @@ pub enum TerrainError {
     Source {
         /// Its name.
         name: String,
+    },
+    /// The number of levels is out of range.
+    #[error("a terrain must have 1 to 7 levels of detail, but `levels.count` is {found}")]
+    Levels {
+        /// The rejected number.
+        found: u8,
+    },
+    /// The falloff of detail is out of range.
+    #[error("the falloff of a terrain's detail must be from 1.75 to 64, but `levels.falloff` is {found}")]
+    Falloff {
+        /// The rejected number.
+        found: f32,
+    },
+    /// The hysteresis of levels is out of range.
+    #[error("the hysteresis of a terrain's levels must be from 0 to 1, but `levels.hysteresis` is {found}")]
+    Hysteresis {
+        /// The rejected share.
+        found: f32,
     },
     /// The isovalue is NaN or infinite.
     #[error("a terrain's isovalue must be finite, but it is {found}")]
@@ -365,6 +397,7 @@ impl Plugin for TerrainPlugin {
             .register_type::<TerrainError>()
             .register_type::<Chunk>()
             .register_type::<ChunkGeometry>()
+            .register_type::<TerrainLevels>()
             .register_type::<Leaf>()
             .register_type::<LeafState>()
             .register_type::<Coverage>()

@@ -5,13 +5,15 @@
 //! each loaded chunk), [`Groups`] (chunks meshed together), [`Cover`] (wanted chunks). Events that involve several
 //! parts are functions here, by topic: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples
 //! arrive), [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle)
-//! (colours, normals and isovalue change).
+//! (colours, normals and isovalue change), [`levels`](mod@levels) (levels of detail change).
 
 mod edit;
 mod fill;
 mod follow;
 mod groups;
+mod input;
 mod known_signs;
+mod levels;
 mod memory;
 mod mesh;
 mod restyle;
@@ -32,14 +34,17 @@ pub(crate) use edit::Edits;
 pub(crate) use fill::Filled;
 use groups::Purpose;
 pub(crate) use groups::{ChunkMesh, Group};
+pub(crate) use input::{MeshInput, MeshScratch};
 pub(crate) use known_signs::KnownSigns;
+use levels::Levels;
+pub(crate) use levels::{LevelDetail, LevelJobs};
 pub(crate) use mesh::{MeshResult, PreparedGroup, Shown, Swap};
 pub(crate) use restyle::{Restyle, Restyled};
 pub(crate) use samples::SampleStore;
 pub(crate) use table::{ChunkTable, DrawnMesh, ShowTarget};
 
 use crate::chunk::ChunkKey;
-use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, Residency, UniqueQueue, ViewId};
+use crate::cover::{ChunkQueue, Cover, Coverage, Leaf, LeafState, Residency, UniqueQueue, View, ViewId};
 use crate::jobs::{Results, Ticket};
 use groups::Groups;
 use restyle::{Appearance, Transition};
@@ -67,6 +72,8 @@ pub(crate) struct Heart {
     table: ChunkTable,
     groups: Groups,
     cover: Cover,
+    /// `None` if there is one level of detail.
+    levels: Option<Levels>,
     /// Whether a viewer has moved since chunks last followed.
     has_moved: bool,
     /// Chunks that may be wanted more than now, and chunks that may be wanted less.
@@ -116,6 +123,7 @@ impl Default for Heart {
             table: ChunkTable::new(Region::new([0; 3], [0; 3]), true),
             groups: Groups::default(),
             cover: Cover::default(),
+            levels: None,
             has_moved: false,
             arriving: ChunkQueue::default(),
             leaving: UniqueQueue::default(),
@@ -173,6 +181,11 @@ impl Heart {
         self.sampling_settings = Some(settings);
         let Self { table, arriving, cover, .. } = self;
         table.keys().for_each(|key| arriving.add(key, cover));
+    }
+
+    /// Whether the terrain has several levels of detail.
+    pub(crate) const fn has_levels(&self) -> bool {
+        self.levels.is_some()
     }
 
     /// The chunks that exist; `None` before the terrain's settings have been accepted.
@@ -234,13 +247,30 @@ impl Heart {
 
     /// The leaf at a position; `None` if it is in no view.
     pub(crate) fn leaf_at(&self, position: [i32; 3]) -> Option<Leaf> {
+        if let Some(levels) = &self.levels {
+            return self.level_leaf_at(levels, position);
+        }
         let is_coming = || self.cover.contains(position).then_some(LeafState::Waiting);
         let state = self.table.leaf_state(ChunkKey::finest(position)).or_else(is_coming)?;
         Some(Leaf { level: 0, position: position.into(), state })
     }
 
+    /// All leaves that have come; those in views that are still to come are left out.
+    pub(crate) fn leaves(&self) -> impl Iterator<Item = Leaf> + '_ {
+        let levels = self.levels.iter().flat_map(|levels| levels.leaves(&self.table));
+        let keys = self.levels.is_none().then(|| self.table.keys()).into_iter().flatten();
+        let chunks = keys.filter_map(|key| {
+            let state = self.table.leaf_state(key)?;
+            Some(Leaf { level: 0, position: key.position.into(), state })
+        });
+        levels.chain(chunks)
+    }
+
     /// The numbers of leaves in each state.
     pub(crate) fn coverage(&self) -> Coverage {
+        if let Some(levels) = &self.levels {
+            return self.level_coverage(levels);
+        }
         let counts = self.table.counts();
         let is_coming = |key: &ChunkKey| !self.table.is_leaf(*key) && self.cover.contains(key.position);
         let mut coming: HashSet<ChunkKey> = self.arriving.iter().filter(is_coming).collect();
@@ -250,7 +280,8 @@ impl Heart {
 
     /// Whether all chunks in range have their samples.
     pub(crate) fn is_filled(&self) -> bool {
-        let have_come = self.cover.is_revealed() && self.arriving.is_empty();
+        let has_levels = self.levels.as_ref().is_none_or(Levels::is_idle);
+        let have_come = has_levels && self.cover.is_revealed() && self.arriving.is_empty();
         let is_idle = have_come && self.leaving.is_empty() && self.remote.is_empty();
         self.sampling_settings.is_some()
             && self.table.counts().unfilled == 0
@@ -279,7 +310,13 @@ impl Heart {
     /// The number of chunks that can be meshed or are being meshed.
     pub(crate) fn waiting_for_meshes(&self) -> usize {
         let in_transition = self.transition.as_ref().map_or(0, Transition::waiting);
-        self.table.ready_len() + self.to_mesh.len() + self.groups.len() + self.to_restyle.len() + in_transition
+        let of_levels = self.levels.as_ref().map_or(0, Levels::waiting_for_meshes);
+        self.table.ready_len()
+            + self.to_mesh.len()
+            + self.groups.len()
+            + self.to_restyle.len()
+            + in_transition
+            + of_levels
     }
 
     /// The number of chunks in or beside the views that have not been visited yet.
@@ -288,13 +325,18 @@ impl Heart {
     }
 
     /// Changes a viewer's view; `None` removes it.
-    pub(crate) fn set_view(&mut self, id: ViewId, view: Option<crate::cover::View>) {
-        let Self { cover, table, arriving, leaving, to_fill, to_mesh, has_moved, .. } = self;
+    pub(crate) fn set_view(&mut self, id: ViewId, view: Option<View>) {
+        let Self { cover, levels, table, arriving, leaving, to_fill, to_mesh, has_moved, .. } = self;
         let old = cover.view(id).copied();
         if old == view {
             return;
         }
         *has_moved = true;
+        if let Some(levels) = levels {
+            levels.set_view(id, view.as_ref());
+            cover.set_quietly(id, view);
+            return sort_again([arriving, to_fill, to_mesh], id, old, view, cover);
+        }
         let keeps_samples = !cover.drops_samples() && view.is_none_or(|view| view.samples.is_none());
         cover.set(
             id,
@@ -312,12 +354,17 @@ impl Heart {
                 }
             },
         );
-        for queue in [arriving, to_fill, to_mesh] {
-            match (old, view) {
-                (Some(old), Some(view)) if view.differs_in_urgency(&old) => queue.sort_again(id),
-                (_, None) => queue.remove_view(id, cover),
-                _ => {}
-            }
+        sort_again([arriving, to_fill, to_mesh], id, old, view, cover);
+    }
+}
+
+/// Notes in queues that a viewer's view has changed.
+fn sort_again(queues: [&mut ChunkQueue; 3], id: ViewId, old: Option<View>, view: Option<View>, cover: &Cover) {
+    for queue in queues {
+        match (old, view) {
+            (Some(old), Some(view)) if view.differs_in_urgency(&old) => queue.sort_again(id),
+            (_, None) => queue.remove_view(id, cover),
+            _ => {}
         }
     }
 }

@@ -189,6 +189,16 @@ impl View {
         Self::new(of(self.range), self.margin, self.samples.map(of), self.forward)
     }
 
+    /// Whether it is a box of chunks, rather than what a viewer sees.
+    pub(crate) const fn is_box(&self) -> bool {
+        self.range.is_box
+    }
+
+    /// The bounding box of the chunks in range.
+    pub(crate) fn chunks(&self) -> Region {
+        self.range.grown(0.0).bounds()
+    }
+
     /// The view with another viewing direction.
     #[must_use]
     pub(crate) const fn facing(self, forward: [f64; 3]) -> Self {

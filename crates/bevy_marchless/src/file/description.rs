@@ -15,7 +15,7 @@ use crate::source::{HeightMap, HeightMapSettings};
 use crate::source::{
     Landscape, LandscapeSettings, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings,
 };
-use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain};
+use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainLevels};
 
 /// A description of a terrain: plain data, read from a file or written in code, kept as an asset.
 #[derive(Asset, Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
@@ -36,6 +36,9 @@ pub struct TerrainDescription {
     /// Sets [`Terrain::keep`]. Default: everything, which an endless extent does not allow.
     #[serde(default)]
     pub keep: Keep,
+    /// Sets [`Terrain::levels`]. Default: one level.
+    #[serde(default)]
+    pub levels: TerrainLevels,
 }
 
 /// A description of a terrain's source: its samples before it is edited.
@@ -87,6 +90,7 @@ impl TerrainDescription {
             voxel_size: default_voxel_size(),
             extent: default_extent(),
             keep: Keep::default(),
+            levels: TerrainLevels::default(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Functions that mesh chunks, on any thread.
 
 use core::cell::RefCell;
+use core::error::Error;
 use core::iter;
 use core::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
@@ -10,11 +11,12 @@ use bevy_math::bounding::Aabb3d;
 use bevy_mesh::{Indices, Mesh, PrimitiveTopology};
 use bevy_platform::time::Instant;
 use bevy_tasks::ComputeTaskPool;
-use marchless::{Block, MeshBuffer, MeshError, MeshSettings, Mesher, NeighbourhoodView};
+use marchless::{MeshBuffer, MeshSettings};
 
 use super::ATTRIBUTE_MATERIAL;
 use super::pool::{MeshPool, PooledAsset, PooledMesh};
-use crate::volume::{ChunkMesh, Colors};
+use crate::chunk::ChunkKey;
+use crate::volume::{ChunkMesh, Colors, MeshInput, MeshScratch};
 
 /// The style of a mesh asset.
 #[derive(Clone)]
@@ -30,18 +32,18 @@ pub(crate) struct AssetStyle {
 /// `style`: of its asset; with `None` no asset is made. `pool`: memory for the mesh; without it, memory of exactly the
 /// mesh's size is allocated.
 pub(crate) fn mesh_chunk(
-    samples: &NeighbourhoodView<'_>,
-    position: [i32; 3],
+    input: &MeshInput,
+    key: ChunkKey,
     settings: &MeshSettings,
     style: Option<&AssetStyle>,
     pool: Option<&MeshPool>,
 ) -> ChunkMesh {
-    mesh_with(position, style, pool, |mesher, block, out| samples.mesh(mesher, block, settings, out))
+    mesh_with(key, style, pool, |scratch, out| input.mesh(scratch, settings, out))
 }
 
-/// Meshes chunks and waits for them, with the help of the compute pool if there is one. Meshes are sorted by position.
+/// Meshes chunks and waits for them, with the help of the compute pool if there is one. Meshes are sorted by key.
 pub(crate) fn mesh_now(
-    chunks: &[([i32; 3], NeighbourhoodView<'_>)],
+    chunks: &[(ChunkKey, MeshInput)],
     settings: &MeshSettings,
     style: Option<&AssetStyle>,
     pool: &MeshPool,
@@ -49,8 +51,8 @@ pub(crate) fn mesh_now(
     let next = AtomicUsize::new(0);
     // Each thread takes the next chunk when it is free. Waking a thread for each chunk would take longer.
     let take = || {
-        let (position, samples) = chunks.get(next.fetch_add(1, Ordering::Relaxed))?;
-        Some(mesh_chunk(samples, *position, settings, style, Some(pool)))
+        let (key, input) = chunks.get(next.fetch_add(1, Ordering::Relaxed))?;
+        Some(mesh_chunk(input, *key, settings, style, Some(pool)))
     };
     let Some(pool) = ComputeTaskPool::try_get().filter(|_| chunks.len() > 1) else {
         return iter::from_fn(take).collect();
@@ -63,46 +65,46 @@ pub(crate) fn mesh_now(
         meshed.extend(iter::from_fn(take));
     });
     meshed.extend(helped.into_iter().flatten());
-    meshed.sort_by_key(|meshed| meshed.position);
+    meshed.sort_by_key(|meshed| meshed.key);
     meshed
 }
 
 /// Makes a new asset of a mesh, in the colours of `style`.
-pub(crate) fn recolor(position: [i32; 3], geometry: Arc<MeshBuffer>, style: Option<&AssetStyle>) -> ChunkMesh {
+pub(crate) fn recolor(key: ChunkKey, geometry: Arc<MeshBuffer>, style: Option<&AssetStyle>) -> ChunkMesh {
     let start = Instant::now();
     let mesh = style.map(|style| to_asset(&geometry, style, PooledAsset::default()));
-    ChunkMesh { position, geometry, mesh, time: start.elapsed() }
+    ChunkMesh { key, geometry, mesh, time: start.elapsed() }
 }
 
 /// Runs `mesh` with this thread's scratch memory, and makes an asset of the result. An error is logged, and gives an
 /// empty mesh.
 pub(super) fn mesh_with(
-    position: [i32; 3],
+    key: ChunkKey,
     style: Option<&AssetStyle>,
     pool: Option<&MeshPool>,
-    mesh: impl FnOnce(&mut Mesher, &mut Block<i16>, &mut MeshBuffer) -> Result<(), MeshError>,
+    mesh: impl FnOnce(&mut MeshScratch, &mut MeshBuffer) -> Result<(), Box<dyn Error>>,
 ) -> ChunkMesh {
     thread_local! {
-        static SCRATCH: RefCell<(Mesher, Block<i16>, MeshBuffer)> =
-            RefCell::new((Mesher::new(), Block::new(), MeshBuffer::new()));
+        static SCRATCH: RefCell<(MeshScratch, MeshBuffer)> =
+            RefCell::new((MeshScratch::default(), MeshBuffer::new()));
     }
     let start = Instant::now();
     // Copy the mesh: scratch buffers only grow, while the copy takes the memory that it needs or that the pool gave it.
-    let pooled = SCRATCH.with_borrow_mut(|(mesher, block, geometry)| match mesh(mesher, block, geometry) {
+    let pooled = SCRATCH.with_borrow_mut(|(scratch, geometry)| match mesh(scratch, geometry) {
         Ok(()) => {
             let mut pooled = pool.map_or_else(PooledMesh::default, |pool| pool.take_for(geometry));
             copy(geometry, &mut pooled.geometry);
             pooled
         }
         Err(error) => {
-            bevy_log::error!("chunk {position:?} cannot be meshed: {error}");
+            bevy_log::error!("chunk {:?} of level {} cannot be meshed: {error}", key.position, key.level);
             PooledMesh::default()
         }
     });
     let PooledMesh { geometry, asset } = pooled;
     let mesh = style.filter(|_| !geometry.is_empty()).map(|style| to_asset(&geometry, style, asset));
     let geometry = Arc::new(geometry);
-    ChunkMesh { position, geometry, mesh, time: start.elapsed() }
+    ChunkMesh { key, geometry, mesh, time: start.elapsed() }
 }
 
 fn copy(from: &MeshBuffer, to: &mut MeshBuffer) {

@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use super::MeshPresenter;
 use super::job::mesh_with;
-use crate::chunk::ChunkGeometry;
+use crate::chunk::{ChunkGeometry, ChunkKey};
 use crate::jobs::{Priority, Results, Ticket, WorkQueue};
 use crate::terrain::Palette;
 use crate::volume::ChunkMesh;
@@ -171,7 +171,9 @@ impl ChunkSamples {
             let samples = Samples::new(data.shape, &data.weights)
                 .and_then(|samples| samples.with_materials(materials))
                 .expect("the lengths have been checked");
-            mesh_with([0; 3], style.as_ref(), None, |mesher, _, out| mesher.mesh(samples, &settings, out))
+            mesh_with(ChunkKey::finest([0; 3]), style.as_ref(), None, |scratch, out| {
+                Ok(scratch.mesher.mesh(samples, &settings, out)?)
+            })
         }
     }
 }

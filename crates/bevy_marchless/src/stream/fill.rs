@@ -39,7 +39,8 @@ pub(super) fn take_filled_chunks(
     budget.spend(start);
 }
 
-/// Queues sampling jobs for pending chunks, the most urgent first, up to the limit in flight.
+/// Queues sampling jobs for pending chunks, the most urgent first, up to the limit in flight; and the job that plans
+/// changes of levels.
 pub(super) fn ask_for_samples(
     mut volumes: Query<&mut TerrainVolume>,
     queue: Res<WorkQueue>,
@@ -50,6 +51,9 @@ pub(super) fn ask_for_samples(
     let threads = AsyncComputeTaskPool::try_get().map_or(1, |pool| pool.thread_num().max(1));
     let limit = settings.in_flight(threads);
     for mut volume in &mut volumes {
+        if volume.heart().has_to_plan() {
+            volume.heart_mut().start_plan(|job, results| queue.push(Priority::Plan, move || results.push(job.run())));
+        }
         if volume.heart().has_to_ask() {
             let results = volume.heart().fill_results().clone();
             volume.heart_mut().ask_for_samples(limit, |job| {

@@ -28,6 +28,8 @@ pub(super) struct TerrainViews {
     views: EntityHashMap<(TerrainViewer, View)>,
     /// The terrain's state from which the views were made.
     at: Option<TerrainState>,
+    /// Whether the terrain had several levels of detail then.
+    has_levels: bool,
     /// The latest run of the system that visited the terrain.
     run: u64,
     /// The number of updates without a viewer; stays at [`PATIENCE`] once reached or once there was a viewer.
@@ -180,6 +182,11 @@ impl ViewOf<'_> {
             volume.heart_mut().set_view(Some(*viewer), None);
         }
         let mut viewers = self.seen.changed.clone();
+        let has_levels = volume.heart().has_levels();
+        if core::mem::replace(&mut followed.has_levels, has_levels) != has_levels {
+            // Views with levels have other limits.
+            followed.views.clear();
+        }
         if all {
             viewers = self.seen.seen.keys().copied().collect();
             viewers.sort_unstable();

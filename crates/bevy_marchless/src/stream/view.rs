@@ -54,11 +54,12 @@ impl ViewFinder<'_> {
             return Some(viewed.facing(forward));
         }
         let whole = LoadRegion::ellipsoid(middle, radii.map(|radius| radius + STEP), extent);
-        let range = limited(whole);
+        let has_levels = self.terrain.levels.count > 1;
+        let range = if has_levels { whole } else { limited(whole) };
         self.note_scaled_radii(terrain, viewer, settings, range != whole);
-        let margin = limited_margin(&range, margin);
+        let margin = if has_levels { 0.0 } else { limited_margin(&range, margin) };
         // Nothing is dropped if the sample radius covers everything that may be loaded.
-        let drops = samples < range.longest() + margin + 2.0;
+        let drops = !has_levels && samples < range.longest() + margin + 2.0;
         let samples = drops.then(|| LoadRegion::ellipsoid(middle, [samples + STEP; 3], extent));
         Some(View::new(range, margin, samples, forward))
     }

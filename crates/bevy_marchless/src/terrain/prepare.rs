@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::{Terrain, TerrainError, TerrainSources, TerrainVolume};
 use crate::budget::FrameBudget;
-use crate::chunk::{Chunk, ChunkKey, chunk_transform};
+use crate::chunk::{Chunk, chunk_transform};
 use crate::schedule::MakesMeshes;
 use crate::volume::Heart;
 
@@ -52,14 +52,17 @@ pub(crate) fn prepare_terrains(
             && let Some((terrain, before)) = volume.take_next()
         {
             match before {
-                Some(before) if before.chunk_cells == terrain.chunk_cells => {
+                Some(before) if before.chunk_cells == terrain.chunk_cells && !volume.heart().has_levels() => {
                     if before.voxel_size != terrain.voxel_size {
                         place_chunks(&terrain, volume.heart(), &mut transforms);
                     }
                     volume.heart_mut().refill(terrain.sampling_settings(), terrain.isovalue);
                     follow_settings(&mut volume);
                 }
-                _ => start_over(&terrain, &mut volume, meshes.is_some(), &mut commands),
+                _ => {
+                    start_over(&terrain, &mut volume, meshes.is_some(), &mut commands);
+                    volume.heart_mut().set_levels(terrain.levels.detail());
+                }
             }
         }
     }
@@ -70,11 +73,12 @@ pub(crate) fn prepare_terrains(
 fn follow_settings(volume: &mut TerrainVolume) {
     let Some(settings) = volume.settings() else { return };
     let (isovalue, normals, colors) = (settings.isovalue, settings.normals, settings.palette.to_vertex_colors());
-    let extent = settings.chunk_region();
+    let (extent, levels) = (settings.chunk_region(), settings.levels.detail());
     let heart = volume.heart_mut();
     if heart.extent() != Some(extent) {
         heart.resize(extent);
     }
+    heart.set_levels(levels);
     if heart.mesh_settings().normals != normals || **heart.colors() != colors {
         heart.set_appearance(normals, Arc::new(colors));
     }
@@ -93,7 +97,7 @@ fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, meshing: bool, comm
 fn place_chunks(terrain: &Terrain, heart: &Heart, transforms: &mut Query<&mut Transform, With<Chunk>>) {
     for (key, entity) in heart.table().entities() {
         if let Ok(mut transform) = transforms.get_mut(entity) {
-            *transform = chunk_transform(key.position, terrain.chunk_cells, terrain.voxel_size);
+            *transform = chunk_transform(key, terrain.chunk_cells, terrain.voxel_size);
         }
     }
 }
@@ -112,8 +116,7 @@ pub(crate) fn note_copied_chunk(
     mut copied: ResMut<CopiedChunks>,
 ) {
     let Ok(chunk) = chunks.get(added.entity) else { return };
-    let key = ChunkKey { level: chunk.level, position: chunk.position.to_array() };
-    let drawn = volumes.get(chunk.terrain).ok().and_then(|volume| volume.heart().entity(key));
+    let drawn = volumes.get(chunk.terrain).ok().and_then(|volume| volume.heart().entity(chunk.key()));
     if drawn != Some(added.entity) {
         copied.0.push(added.entity);
     }
@@ -139,8 +142,7 @@ pub(crate) fn forget_despawned_chunk(
 ) {
     let Ok(chunk) = chunks.get(removed.entity) else { return };
     let Ok(mut volume) = volumes.get_mut(chunk.terrain) else { return };
-    let key = ChunkKey { level: chunk.level, position: chunk.position.to_array() };
-    volume.heart_mut().despawned(key, removed.entity);
+    volume.heart_mut().despawned(chunk.key(), removed.entity);
 }
 
 /// Drops the chunks and samples of an entity whose `Terrain` was removed.

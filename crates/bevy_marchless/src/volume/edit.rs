@@ -18,7 +18,7 @@ pub(crate) struct Edits {
     /// The sets by number; `None` for those that were merged into others.
     sets: Vec<Option<EditedSet>>,
     /// The set of each chunk that has changed samples, or lies beside one that has.
-    owners: HashMap<[i32; 3], usize>,
+    owners: HashMap<ChunkKey, usize>,
     /// The chunks with changed samples, as they were before.
     before: BTreeMap<[i32; 3], GridChunk<i16>>,
 }
@@ -28,8 +28,8 @@ struct EditedSet {
     edit: Edit,
     /// Chunks with changed samples.
     chunks: Vec<[i32; 3]>,
-    /// Chunks whose meshes read changed samples.
-    affected: BTreeSet<[i32; 3]>,
+    /// Chunks, and leaves of coarser levels, whose meshes read changed samples.
+    affected: BTreeSet<ChunkKey>,
     since: RequestTime,
 }
 
@@ -77,13 +77,17 @@ impl EditedSet {
 impl Heart {
     /// Applies a stamp that was read at `since`.
     pub(crate) fn stamp(&mut self, stamp: QuantisedStamp, since: RequestTime, edits: &mut Edits) {
+        let touched = stamp.region();
+        self.make_place(touched);
         let changed = self.samples.stamp(stamp, &mut edits.before);
         changed.crowded.into_iter().for_each(|position| self.crowded.push(ChunkKey::finest(position)));
         for position in &changed.chunks {
             self.table.samples_changed(ChunkKey::finest(*position));
         }
-        if !changed.edit.is_empty() {
+        let coarser = self.stamped_leaves(touched);
+        if !changed.edit.is_empty() || !coarser.is_empty() {
             let super::samples::StampChanges { edit, chunks, affected, .. } = changed;
+            let affected = affected.into_iter().map(ChunkKey::finest).chain(coarser).collect();
             edits.add(EditedSet { edit, chunks, affected, since });
         }
     }
@@ -97,14 +101,11 @@ impl Heart {
             let before: BTreeMap<_, _> =
                 chunks.iter().filter_map(|chunk| Some((*chunk, before.get(chunk)?.clone()))).collect();
             let redrawn = self.samples.newest().chunks_with_mesh_changes(&before, edit.region, &settings);
-            let unchanged_meshes =
-                redrawn.map(|redrawn| affected.difference(&redrawn).copied().map(ChunkKey::finest).collect());
-            self.changed(Pending {
-                chunks: affected.into_iter().map(ChunkKey::finest).collect(),
-                unchanged_meshes: unchanged_meshes.unwrap_or_default(),
-                since: Some(since),
-            });
-            reports.push(edit);
+            let is_same =
+                |key: &&ChunkKey| key.level == 0 && redrawn.as_ref().is_some_and(|r| !r.contains(&key.position));
+            let unchanged_meshes = affected.iter().filter(is_same).copied().collect();
+            self.changed(Pending { chunks: affected, unchanged_meshes, since: Some(since) });
+            reports.extend(Some(edit).filter(|edit| !edit.is_empty()));
         }
         reports
     }
@@ -164,7 +165,7 @@ mod tests {
     use crate::stats::TerrainStats;
 
     fn set(chunks: core::ops::Range<i32>, volume: u64) -> EditedSet {
-        let affected: BTreeSet<_> = chunks.clone().map(|x| [x, 0, 0]).collect();
+        let affected: BTreeSet<_> = chunks.clone().map(|x| ChunkKey::finest([x, 0, 0])).collect();
         let mut edit = Edit { region: Region::new([chunks.start, 0, 0], [chunks.end, 1, 1]), ..Edit::NONE };
         edit.removed.add(0, volume);
         EditedSet { edit, chunks: vec![[chunks.start, 0, 0]], affected, since: TerrainStats::default().now() }

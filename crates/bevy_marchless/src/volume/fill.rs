@@ -11,6 +11,7 @@ use super::groups::Pending;
 use super::samples::{Replay, Replayed};
 use super::{Heart, KnownSigns, SamplingSettings};
 use crate::chunk::ChunkKey;
+use crate::cover::Residency;
 use crate::jobs::{Ticket, new_number};
 use crate::stats::TerrainStats;
 
@@ -158,6 +159,26 @@ impl Heart {
             self.table.queue(key);
             self.to_fill.add(key, &self.cover);
         }
+    }
+
+    /// Loads and fills a chunk within this update, as an edit needs it.
+    pub(super) fn fill_now(&mut self, key: ChunkKey) {
+        let Some(settings) = self.sampling_settings.clone() else { return };
+        if !self.table.contains(key) {
+            self.table.load(key, Residency::Samples);
+        }
+        if self.table.is_filled(key) {
+            return;
+        }
+        if self.samples.is_resident(key.position) {
+            self.table.samples_arrived(key, None);
+            return self.filled_around(key);
+        }
+        if self.table.has_job(key) {
+            self.sampling -= 1;
+        }
+        let Filled { chunk, signs, replayed, .. } = self.fill_job(&settings, key.position, 0).run();
+        self.take_in(key, chunk, signs, Some(replayed));
     }
 
     /// Takes in the samples of a loaded chunk, with the stamps that came before them.

@@ -67,7 +67,7 @@ impl Heart {
     /// Whether leaves wait though there is nothing left to do. They went out of range before they were drawn, and the
     /// margin keeps only drawn chunks.
     fn has_lost_leaves(&self) -> bool {
-        self.table.makes_meshes() && self.table.counts().waiting > 0 && self.is_idle()
+        self.levels.is_none() && self.table.makes_meshes() && self.table.counts().waiting > 0 && self.is_idle()
     }
 
     /// Visits all chunks, once after viewers have come to rest.
@@ -104,6 +104,9 @@ impl Heart {
         let former = core::mem::replace(&mut settings.extent, extent);
         self.samples.resize(extent);
         self.table.resize(extent);
+        if self.levels.is_some() {
+            return self.restart_levels();
+        }
         let is_inner = |key: &ChunkKey, region: Region| {
             (0..3).all(|axis| (region.min[axis] + 1..region.max[axis] - 1).contains(&key.position[axis]))
         };
@@ -145,10 +148,12 @@ impl Heart {
     /// The next chunk that may be wanted more than now.
     fn next_arriving(&mut self, until: Instant) -> Option<ChunkKey> {
         loop {
-            let Self { arriving, cover, table, .. } = self;
-            let waits = |key: &ChunkKey| {
-                table.contains(*key) || cover.wanted(key.position, Residency::Samples) > Residency::Gone
+            let Self { arriving, cover, levels, table, .. } = self;
+            let wanted = |position| match &*levels {
+                Some(levels) => levels.wanted(position),
+                None => cover.wanted(position, Residency::Samples),
             };
+            let waits = |key: &ChunkKey| table.contains(*key) || wanted(key.position) > Residency::Gone;
             let next = arriving.pop(cover, waits);
             if next.is_some() || Instant::now() >= until || !self.reveal(until) {
                 return next;
@@ -160,7 +165,7 @@ impl Heart {
     fn follow_residency(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         let Some(extent) = self.extent() else { return };
         let is_there = extent.contains(key.position);
-        let wanted = if is_there { self.cover.wanted(key.position, self.table.kept(key)) } else { Residency::Gone };
+        let wanted = if is_there { self.wanted(key) } else { Residency::Gone };
         match (self.table.contains(key), wanted) {
             (false, Residency::Gone) => return,
             (false, _) => self.load(key, wanted, stats),
@@ -177,6 +182,14 @@ impl Heart {
         }
     }
 
+    /// The residency that viewers ask for, for a chunk as it is.
+    fn wanted(&self, key: ChunkKey) -> Residency {
+        match &self.levels {
+            Some(levels) => levels.wanted(key.position),
+            None => self.cover.wanted(key.position, self.table.kept(key)),
+        }
+    }
+
     fn load(&mut self, key: ChunkKey, wanted: Residency, stats: &mut TerrainStats) {
         self.table.load(key, wanted);
         stats.loaded += 1;
@@ -187,7 +200,7 @@ impl Heart {
     fn load_lost_neighbours(&mut self, key: ChunkKey, extent: Region, stats: &mut TerrainStats) {
         // The missing neighbours of a chunk in range are loaded anyway, once they have been reported.
         let is_reported = self.cover.is_revealed() && self.cover.contains(key.position);
-        if is_reported || !self.table.lacks_samples(key) {
+        if self.levels.is_some() || is_reported || !self.table.lacks_samples(key) {
             return;
         }
         for near in key.around().filter(|near| extent.contains(near.position)) {
@@ -200,7 +213,7 @@ impl Heart {
     }
 
     /// Unloads a chunk; only its edits stay.
-    fn unload(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
+    pub(super) fn unload(&mut self, key: ChunkKey, stats: &mut TerrainStats) {
         self.hide(key);
         match self.table.unload(key) {
             Unloaded::Nothing => {}
@@ -212,7 +225,7 @@ impl Heart {
     }
 
     /// Stops drawing a chunk.
-    fn hide(&mut self, key: ChunkKey) {
+    pub(super) fn hide(&mut self, key: ChunkKey) {
         if self.table.is_leaf(key) {
             self.groups.withdraw_from(key);
             self.groups.wake();
@@ -251,7 +264,7 @@ impl Heart {
         };
         self.table.is_filled(key)
             && matches!(self.samples.newest().chunk(key.position), Some(GridChunk::Samples(_)))
-            && !self.samples.touches_boundary(key.position)
+            && !self.samples.is_held(key.position)
             && key.around().filter(|near| settings.extent.contains(near.position)).all(is_done)
     }
 

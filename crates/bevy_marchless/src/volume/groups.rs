@@ -78,7 +78,7 @@ impl Purpose {
 
 /// A chunk's new mesh.
 pub(crate) struct ChunkMesh {
-    pub(crate) position: [i32; 3],
+    pub(crate) key: ChunkKey,
     pub(crate) geometry: Arc<MeshBuffer>,
     /// The mesh as an asset, if assets are wanted and there is something to draw.
     pub(crate) mesh: Option<Mesh>,
@@ -88,8 +88,8 @@ pub(crate) struct ChunkMesh {
 
 impl ChunkMesh {
     /// A mesh with nothing to draw.
-    pub(crate) fn empty(position: [i32; 3]) -> Self {
-        Self { position, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
+    pub(crate) fn empty(key: ChunkKey) -> Self {
+        Self { key, geometry: Arc::default(), mesh: None, time: Duration::ZERO }
     }
 }
 

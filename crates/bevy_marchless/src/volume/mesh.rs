@@ -7,6 +7,7 @@ use bevy_platform::time::Instant;
 use marchless::{Grid, GridChunk};
 
 use super::groups::{ChunkMesh, Group, Pending, Purpose};
+use super::levels::LevelMesh;
 use super::samples::shares_samples;
 use super::table::{DrawnMesh, ShowTarget};
 use super::{Heart, Restyled};
@@ -17,7 +18,7 @@ use crate::stats::RequestTime;
 /// A group before it starts, and its chunks that are to be meshed.
 pub(crate) struct PreparedGroup {
     pub(crate) group: Group,
-    pub(crate) to_mesh: Vec<[i32; 3]>,
+    pub(crate) to_mesh: Vec<ChunkKey>,
 }
 
 /// The result of a meshing job.
@@ -26,6 +27,8 @@ pub(crate) enum MeshResult {
     OfGroup(u64, ChunkMesh),
     /// A chunk meshed for the isovalue to come.
     Restyled(Restyled),
+    /// A leaf of a change of levels.
+    OfLevels(LevelMesh),
 }
 
 /// A new mesh, and where to show it.
@@ -48,7 +51,9 @@ pub(crate) struct Shown {
 impl Heart {
     /// Whether chunks wait to be meshed or shown.
     pub(crate) fn has_to_mesh(&self) -> bool {
-        self.groups.may_start() || self.table.ready_len() > 0 || !self.to_mesh.is_empty() || self.has_to_restyle()
+        let has_levels = self.levels.as_ref().is_some_and(super::Levels::has_work);
+        let has_chunks = self.table.ready_len() > 0 || !self.to_mesh.is_empty();
+        self.groups.may_start() || has_chunks || has_levels || self.has_to_restyle()
     }
 
     /// Whether results of meshing jobs wait to be taken.
@@ -145,6 +150,11 @@ impl Heart {
         };
         let mut to_mesh = Vec::new();
         for key in group.chunks.iter().copied().filter(|key| self.table.can_be_drawn(*key)) {
+            if key.level > 0 {
+                group.members += 1;
+                to_mesh.push(key);
+                continue;
+            }
             let samples = self.samples.newest().neighbourhood_view(key.position);
             let shown = self.samples.shown().neighbourhood_view(key.position);
             for (near, (chunk, shown)) in key.around().zip(samples.chunks().iter().zip(shown.chunks())) {
@@ -160,9 +170,9 @@ impl Heart {
             }
             group.members += 1;
             if samples.is_uniform() {
-                group.meshed.push(ChunkMesh::empty(key.position));
+                group.meshed.push(ChunkMesh::empty(key));
             } else {
-                to_mesh.push(key.position);
+                to_mesh.push(key);
             }
         }
         if group.members == 0 && group.snapshot.is_empty() {
@@ -171,12 +181,12 @@ impl Heart {
         Some(PreparedGroup { group, to_mesh })
     }
 
-    /// Starts a group whose chunks are meshed in jobs. `start` starts the job for the chunk at a position, for the
-    /// group with this number.
-    pub(crate) fn start(&mut self, prepared: PreparedGroup, mut start: impl FnMut(&Self, u64, [i32; 3]) -> Ticket) {
+    /// Starts a group whose chunks are meshed in jobs. `start` starts the job for a chunk, for the group with this
+    /// number.
+    pub(crate) fn start(&mut self, prepared: PreparedGroup, mut start: impl FnMut(&Self, u64, ChunkKey) -> Ticket) {
         let PreparedGroup { group, to_mesh } = prepared;
         let id = self.groups.start(group);
-        let tickets: Vec<Ticket> = to_mesh.into_iter().map(|position| start(self, id, position)).collect();
+        let tickets: Vec<Ticket> = to_mesh.into_iter().map(|key| start(self, id, key)).collect();
         if let Some(group) = self.groups.get_mut(id) {
             group.tickets = tickets;
         }
@@ -195,6 +205,10 @@ impl Heart {
                 MeshResult::Restyled(restyled) => {
                     note(&restyled.meshed);
                     self.take_restyled(restyled);
+                }
+                MeshResult::OfLevels(mesh) => {
+                    note(&mesh.meshed);
+                    self.take_level_mesh(mesh);
                 }
                 MeshResult::OfGroup(id, meshed) => {
                     let Some(group) = self.groups.get_mut(id) else { continue };
@@ -216,7 +230,7 @@ impl Heart {
     /// Shows all chunks of a complete group.
     pub(crate) fn show(&mut self, group: Group) -> Shown {
         let Group { chunks, snapshot, appearance, since, meshed, .. } = group;
-        let is_left = |meshed: &ChunkMesh| chunks.contains(&ChunkKey::finest(meshed.position));
+        let is_left = |meshed: &ChunkMesh| chunks.contains(&meshed.key);
         let swaps = meshed.into_iter().filter(is_left).map(|meshed| self.swap(meshed, appearance)).collect();
         for (position, chunk) in snapshot {
             let key = ChunkKey::finest(position);
@@ -238,13 +252,13 @@ impl Heart {
 
     /// Takes in a new mesh, and says where it is to be shown.
     pub(super) fn swap(&mut self, meshed: ChunkMesh, appearance: u64) -> Swap {
-        let key = ChunkKey::finest(meshed.position);
+        let key = meshed.key;
         self.has_shown = true;
         Swap { key, place: self.table.meshed(key, &meshed.geometry, appearance), meshed, appearance }
     }
 
     /// Follows up on a change of a shown chunk.
-    fn shown(&mut self, key: ChunkKey) {
+    pub(super) fn shown(&mut self, key: ChunkKey) {
         self.has_shown = true;
         self.table.look_again(key);
         self.may_drop_around(key);

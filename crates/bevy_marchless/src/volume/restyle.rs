@@ -50,6 +50,10 @@ pub(super) struct Transition {
 }
 
 impl Transition {
+    pub(super) const fn isovalue(&self) -> f32 {
+        self.isovalue
+    }
+
     pub(super) fn waiting(&self) -> usize {
         self.waiting.len() + self.lacking.len() + self.running.len()
     }
@@ -143,6 +147,7 @@ impl Heart {
         self.table.keys().filter(|key| self.table.is_shown(*key)).for_each(|key| waiting.push(key));
         if waiting.is_empty() {
             self.isovalue = isovalue;
+            self.restart_level_meshes();
             // Chunks that are being meshed for the first time have the former isovalue.
             self.restart_groups();
             return;
@@ -203,8 +208,8 @@ impl Heart {
             if self.table.lacks_samples(key) {
                 transition.lacking.insert(key);
                 self.look_at(key);
-            } else if is_uniform_around(self.samples.newest(), key.position) {
-                transition.done.insert(key, (ChunkMesh::empty(key.position), self.appearance.number));
+            } else if key.level == 0 && is_uniform_around(self.samples.newest(), key.position) {
+                transition.done.insert(key, (ChunkMesh::empty(key), self.appearance.number));
             } else {
                 return Some((key, new_number(), MeshSettings { isovalue: transition.isovalue, ..settings }));
             }
@@ -226,7 +231,7 @@ impl Heart {
     /// Takes in a chunk that a job has meshed for the isovalue to come.
     pub(crate) fn take_restyled(&mut self, restyled: Restyled) {
         let Restyled { job, meshed, appearance } = restyled;
-        let key = ChunkKey::finest(meshed.position);
+        let key = meshed.key;
         if let Some(transition) = &mut self.transition
             && transition.running.get(&key).is_some_and(|(number, _)| *number == job)
         {
@@ -246,7 +251,7 @@ impl Heart {
     pub(crate) fn meshed_in_transition(&mut self, meshed: ChunkMesh) {
         let appearance = self.appearance.number;
         if let Some(transition) = &mut self.transition {
-            transition.done.insert(ChunkKey::finest(meshed.position), (meshed, appearance));
+            transition.done.insert(meshed.key, (meshed, appearance));
         }
     }
 
@@ -256,11 +261,14 @@ impl Heart {
         let is_done = |transition: &mut Transition| transition.waiting() == 0;
         let Transition { isovalue, done, .. } = self.transition.take_if(is_done)?;
         self.isovalue = isovalue;
+        self.restart_level_meshes();
         let mut shown = Shown::default();
         let groups = self.groups.take_all();
         for (_, (meshed, appearance)) in done {
-            let key = ChunkKey::finest(meshed.position);
-            self.samples.show_newest(key.position);
+            let key = meshed.key;
+            if key.level == 0 {
+                self.samples.show_newest(key.position);
+            }
             shown.swaps.push(self.swap(meshed, appearance));
             if appearance != self.appearance.number {
                 self.to_restyle.push(key);
@@ -268,7 +276,7 @@ impl Heart {
             self.may_drop_around(key);
         }
         for key in groups.iter().flat_map(|pending| &pending.chunks) {
-            for near in key.around().filter(|near| self.table.contains(*near)) {
+            for near in key.around().filter(|near| near.level == 0 && self.table.contains(*near)) {
                 self.samples.show_newest(near.position);
             }
             self.table.look_again(*key);

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use bevy_platform::collections::HashMap;
-use marchless::{DEFAULT_CHUNK_CELLS, Edit, Grid, GridChunk, NeighbourhoodView, QuantisedStamp, Region, SamplePool};
+use marchless::{
+    DEFAULT_CHUNK_CELLS, Edit, Grid, GridChunk, LeafKey, NeighbourhoodView, QuantisedStamp, Region, SamplePool,
+};
 
 use super::stamps::{LoggedStamp, StampLog};
 use crate::jobs::new_number;
@@ -114,7 +116,7 @@ impl SampleStore {
     }
 
     /// Whether the samples stay wherever viewers are.
-    pub(super) fn touches_boundary(&self, position: [i32; 3]) -> bool {
+    pub(super) fn is_held(&self, position: [i32; 3]) -> bool {
         self.edited.get(&position) == Some(&KeptEdits::Held)
     }
 
@@ -126,6 +128,32 @@ impl SampleStore {
     /// The newest samples that meshing a chunk reads.
     pub(crate) fn neighbourhood(&self, position: [i32; 3]) -> NeighbourhoodView<'_, i16> {
         self.newest.neighbourhood_view(position)
+    }
+
+    /// What edits a leaf's samples need: stamps in order, and the held chunks, whose stamps are not kept.
+    pub(super) fn edits_around(&self, leaf: LeafKey) -> (Vec<QuantisedStamp>, Option<Grid<i16>>) {
+        let chunks = leaf.region();
+        // A leaf reads one lattice point of its level beyond itself.
+        let reach = (1u32 << leaf.level).div_ceil(self.newest.chunk_cells());
+        let chunks = chunks.grown(reach, reach);
+        let ends = [chunks.min, chunks.max].map(|end| self.newest.chunk_region(end).min);
+        let stamps = self.log.concerning(chunks, Region::new(ends[0], ends[1]), 0);
+        let mut known = None;
+        if self.held > 0 {
+            let held = self.newest.chunks_in(chunks).filter(|(position, _)| self.is_held(*position));
+            for (position, chunk) in held {
+                let known = known.get_or_insert_with(|| Grid::new(self.newest.chunk_cells()).expect("as the terrain"));
+                known.insert_clean(position, chunk.clone()).expect("as in the terrain");
+            }
+        }
+        (stamps.into_iter().map(|logged| *logged.stamp).collect(), known)
+    }
+
+    /// Visits the lattice points that every edit has touched.
+    pub(super) fn stamped_regions(&self, mut visit: impl FnMut(Region)) {
+        self.log.all().for_each(|stamp| visit(stamp.region()));
+        let held = self.edited.iter().filter(|(_, edits)| **edits == KeptEdits::Held);
+        held.for_each(|(position, _)| visit(self.newest.chunk_region(*position)));
     }
 
     /// Changes the chunks that are seen. Samples of other chunks stay until they are unloaded; held ones stay for good.
@@ -174,7 +202,7 @@ impl SampleStore {
 
     /// Drops a chunk's samples, unless they are held.
     pub(super) fn unload(&mut self, position: [i32; 3]) {
-        if !self.touches_boundary(position) {
+        if !self.is_held(position) {
             self.newest.remove_clean(position);
         }
     }
@@ -233,8 +261,7 @@ impl SampleStore {
         }
         changed.affected = self.newest.take_dirty();
         let may_be_held = self.held > 0 && count(region) <= u64::from(MAX_STAMPS);
-        let held =
-            if may_be_held { region.points().filter(|position| self.touches_boundary(*position)).count() } else { 0 };
+        let held = if may_be_held { region.points().filter(|position| self.is_held(*position)).count() } else { 0 };
         let at_node = self.log.insert(number, stamp, region, held as u32);
         if at_node > MAX_STAMPS as usize {
             let seen = region.intersection(&bounds);

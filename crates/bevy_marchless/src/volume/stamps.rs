@@ -108,6 +108,11 @@ impl StampLog {
         }
     }
 
+    /// All stamps, in no order.
+    pub(crate) fn all(&self) -> impl Iterator<Item = &QuantisedStamp> {
+        self.nodes.values().flatten().map(|logged| &*logged.stamp)
+    }
+
     /// Removes all stamps; numbers continue.
     pub(crate) fn clear(&mut self) {
         *self = Self { last: self.last, ..Self::default() };

@@ -111,6 +111,17 @@ impl ChunkTable {
         }
     }
 
+    /// Adds a leaf of a coarser level. Its samples are not kept.
+    pub(super) fn load_coarser(&mut self, key: ChunkKey) {
+        let signs = KnownSigns::UNKNOWN;
+        let entry = Entry { role: Role::NEW_LEAF, fill: Fill::Resident, signs, is_outdated: false };
+        self.counts.add(&entry);
+        if let Some(former) = self.chunks.insert(key, entry) {
+            debug_assert!(false, "{key:?} was loaded already");
+            self.counts.take(&former);
+        }
+    }
+
     /// Makes a leaf of a chunk that had samples only.
     pub(super) fn promote(&mut self, key: ChunkKey) {
         self.change(key, |entry| {
@@ -326,7 +337,7 @@ impl ChunkTable {
         for (key, entry) in self.chunks.iter() {
             counts.add(entry);
             let is_there = |near: ChunkKey| self.is_filled(near) || !self.extent.contains(near.position);
-            assert_eq!(self.is_surrounded(key), key.around().all(is_there), "{key:?}");
+            assert_eq!(self.is_surrounded(key), key.level > 0 || key.around().all(is_there), "{key:?}");
             assert_eq!(self.chunks.marks(key), entry.marks(), "{key:?}");
         }
         assert_eq!(self.counts, counts);

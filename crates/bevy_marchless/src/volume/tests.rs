@@ -1,13 +1,15 @@
 //! Random events, until nothing waits: no app, no window, no entity but a number.
 
+mod levels;
+
 use std::collections::HashMap;
 use std::time::Duration;
 
 use bevy_ecs::entity::Entity;
 use bevy_platform::time::Instant;
 use marchless::{
-    Grid, MeshBuffer, MeshSettings, Mesher, NeighbourhoodView, Operation, QuantisedShape, QuantisedStamp, Region,
-    SamplePool,
+    Bound, Grid, LeafKey, MeshBuffer, MeshSettings, Operation, QuantisedShape, QuantisedStamp, Region, SamplePool,
+    SourceRegion,
 };
 use proptest::prelude::*;
 
@@ -73,13 +75,33 @@ struct Game {
     stamps: Vec<QuantisedStamp>,
     waiting: Vec<QuantisedStamp>,
     settings: SamplingSettings,
+    levels: Option<LevelDetail>,
     normals: bool,
     isovalue: f32,
 }
 
+/// Rolling ground around a height.
+struct Hills(f64);
+
+impl Source for Hills {
+    fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
+        let shift = self.0;
+        let hills = move |[x, y, z]: [f64; 3]| y - shift - 3.0 * (x * 0.2).sin() * (z * 0.15).cos();
+        Source::fill(&hills, region, distances, materials);
+    }
+
+    fn bound(&self, region: &SourceRegion) -> Bound {
+        let [low, high] = [[0; 3], region.size.map(|v| v - 1)].map(|end| region.position(end)[1] - self.0);
+        match (low > 3.0, high < -3.0) {
+            (true, _) => Bound::Outside,
+            (_, true) => Bound::Inside { material: 0 },
+            _ => Bound::Mixed,
+        }
+    }
+}
+
 fn sampling_settings(shift: f64, extent: Region) -> SamplingSettings {
-    let hills = move |[x, y, z]: [f64; 3]| y - shift - 3.0 * (x * 0.2).sin() * (z * 0.15).cos();
-    SamplingSettings { source: Arc::new(hills), extent, cells: CELLS, spacing: 1.0 }
+    SamplingSettings { source: Arc::new(Hills(shift)), extent, cells: CELLS, spacing: 1.0 }
 }
 
 fn colors() -> Colors {
@@ -100,6 +122,7 @@ impl Game {
             stamps: Vec::new(),
             waiting: Vec::new(),
             settings,
+            levels: None,
             normals: true,
             isovalue: 0.0,
         }
@@ -129,6 +152,7 @@ impl Game {
                     self.despawned.push(*key);
                 }
             }
+            Event::Source { shift } if self.levels.is_some() => self.start_over(shift),
             Event::Source { shift } => {
                 if self.heart.is_generation_shown() {
                     self.settings = sampling_settings(shift, self.settings.extent);
@@ -149,6 +173,8 @@ impl Game {
             Event::Extent { index } => {
                 self.settings.extent = EXTENTS[index];
                 self.heart.resize(EXTENTS[index]);
+                self.keep();
+                self.take_released();
                 let mut viewers: Vec<u32> = self.views.keys().copied().collect();
                 viewers.sort_unstable();
                 viewers.into_iter().for_each(|viewer| self.appearance(viewer));
@@ -173,9 +199,7 @@ impl Game {
         let now = Instant::now();
         let until = if late { now } else { now + Duration::from_millis(5) };
         self.heart.follow(until, &mut self.stats);
-        for entity in self.heart.take_released() {
-            assert!(self.screen.remove(&entity).is_some(), "released twice, or never shown");
-        }
+        self.take_released();
         self.heart.take_filled(1, until, |_| {});
         let results = self.heart.fill_results().clone();
         self.heart.ask_for_samples(16, |job| {
@@ -183,6 +207,10 @@ impl Game {
             self.queue.push(Priority::Fill(job.urgency), move || results.push(job.run()))
         });
         self.apply_stamps();
+        if self.heart.has_to_plan() {
+            let queue = &self.queue;
+            self.heart.start_plan(|job, results| queue.push(Priority::Plan, move || results.push(job.run())));
+        }
         self.mesh(inline, until);
         (0..jobs).for_each(|_| _ = do_next(&self.queue));
         self.check();
@@ -211,6 +239,7 @@ impl Game {
             let shown = self.heart.show(group);
             self.show(shown);
         }
+        self.heart.take_plan();
         while let Some(prepared) = self.heart.next_changed() {
             if prepared.to_mesh.len() <= inline {
                 self.show_now(prepared);
@@ -218,6 +247,8 @@ impl Game {
                 self.start(prepared, Priority::Edit);
             }
         }
+        self.change_levels(true);
+        self.change_levels(false);
         self.heart.sort_ready(until);
         while let Some((prepared, urgency)) = self.heart.next_first_mesh(8) {
             self.start(prepared, Priority::FirstMesh(urgency));
@@ -229,7 +260,7 @@ impl Game {
                     let results = self.heart.mesh_results().clone();
                     self.heart.start_recolor(group, |id| {
                         self.queue.push(Priority::Restyle, move || {
-                            let meshed = ChunkMesh { geometry, ..ChunkMesh::empty(key.position) };
+                            let meshed = ChunkMesh { geometry, ..ChunkMesh::empty(key) };
                             results.push(MeshResult::OfGroup(id, meshed));
                         })
                     });
@@ -238,28 +269,61 @@ impl Game {
         }
         if self.heart.may_end_transition(inline) {
             while let Some((key, _, settings)) = self.heart.next_in_transition(usize::MAX) {
-                let meshed = meshed(&self.heart.samples().neighbourhood(key.position), key.position, &settings);
+                let meshed = meshed(&self.heart.mesh_input(key), key, &settings);
                 self.heart.meshed_in_transition(meshed);
             }
             let shown = self.heart.end_transition();
             shown.into_iter().for_each(|shown| self.show(shown));
         }
         while let Some((key, job, settings)) = self.heart.next_in_transition(8) {
-            let samples = self.heart.samples().neighbourhood(key.position).to_neighbourhood();
+            let input = self.heart.mesh_input(key);
             let (results, appearance) = (self.heart.mesh_results().clone(), self.heart.appearance());
             let ticket = self.queue.push(Priority::Restyle, move || {
-                let meshed = meshed(&samples.view(), key.position, &settings);
+                let meshed = meshed(&input, key, &settings);
                 results.push(MeshResult::Restyled(Restyled { job, meshed, appearance }));
             });
             self.heart.started_in_transition(key, job, ticket);
         }
     }
 
+    fn take_released(&mut self) {
+        for entity in self.heart.take_released() {
+            assert!(self.screen.remove(&entity).is_some(), "released twice, or never shown");
+        }
+    }
+
+    fn change_levels(&mut self, urgent: bool) {
+        while let Some((change, inputs)) = self.heart.next_level_change(urgent) {
+            let settings = self.heart.mesh_settings();
+            let at_once = inputs.iter().map(|(key, input)| meshed(input, *key, &settings)).collect();
+            let shown = self.heart.show_level_change(change, at_once);
+            self.show(shown);
+            self.take_released();
+        }
+        if urgent {
+            return;
+        }
+        self.heart.start_level_changes();
+        while let Some(jobs) = self.heart.next_level_jobs(8) {
+            let (change, attempt, urgency) = (jobs.change, jobs.attempt(), jobs.urgency);
+            let settings = self.heart.mesh_settings();
+            let job = |(key, input)| {
+                let results = self.heart.mesh_results().clone();
+                self.queue.push(Priority::FirstMesh(urgency), move || {
+                    let meshed = meshed(&input, key, &settings);
+                    results.push(MeshResult::OfLevels(LevelJobs::result(change, attempt, meshed)));
+                })
+            };
+            let tickets = jobs.inputs.into_iter().map(job).collect();
+            self.heart.started_level_jobs(change, tickets);
+        }
+    }
+
     fn show_now(&mut self, prepared: PreparedGroup) {
         let PreparedGroup { mut group, to_mesh } = prepared;
         let settings = self.heart.mesh_settings();
-        for position in to_mesh {
-            group.push(meshed(&self.heart.samples().neighbourhood(position), position, &settings));
+        for key in to_mesh {
+            group.push(meshed(&self.heart.mesh_input(key), key, &settings));
         }
         let shown = self.heart.show(group);
         self.show(shown);
@@ -270,11 +334,11 @@ impl Game {
             return self.show_now(prepared);
         }
         let (results, settings) = (self.heart.mesh_results().clone(), self.heart.mesh_settings());
-        self.heart.start(prepared, |heart, id, position| {
-            let samples = heart.samples().neighbourhood(position).to_neighbourhood();
+        self.heart.start(prepared, |heart, id, key| {
+            let input = heart.mesh_input(key);
             let results = results.clone();
             self.queue.push(priority, move || {
-                results.push(MeshResult::OfGroup(id, meshed(&samples.view(), position, &settings)));
+                results.push(MeshResult::OfGroup(id, meshed(&input, key, &settings)));
             })
         });
     }
@@ -306,6 +370,9 @@ impl Game {
         let heart = &self.heart;
         heart.table.check();
         heart.groups.check();
+        if let Some(levels) = &heart.levels {
+            self.check_levels(levels);
+        }
         let drawn: HashMap<_, _> = heart.table.entities().map(|(key, entity)| (entity, key)).collect();
         assert_eq!(drawn.len(), self.screen.len(), "what is drawn is on the screen");
         for (entity, key) in drawn {
@@ -316,7 +383,7 @@ impl Game {
         for position in WHOLE.points() {
             let key = ChunkKey::finest(position);
             let (is_filled, is_resident) = (heart.table.is_filled(key), heart.samples.is_resident(position));
-            let may_be_resident = is_filled || heart.samples.touches_boundary(position);
+            let may_be_resident = is_filled || heart.samples.is_held(position);
             assert!(
                 is_resident == is_filled || is_resident && may_be_resident,
                 "{position:?}: {is_filled}, {is_resident}"
@@ -344,7 +411,8 @@ impl Game {
         assert_eq!(heart.isovalue(), self.isovalue);
         assert!(heart.is_generation_shown() && heart.sampling == 0 && heart.groups.is_empty());
         let extent = self.settings.extent;
-        assert!(heart.table.keys().all(|key| extent.contains(key.position)), "what lies beyond has gone");
+        let is_there = |key: ChunkKey| !LeafKey::from(key).region().intersection(&extent).is_empty();
+        assert!(heart.table.keys().all(is_there), "what lies beyond has gone");
         let mut fresh = Grid::<i16>::bounded(CELLS, extent).expect("a good extent");
         for position in extent.points() {
             let source = self.settings.source.as_ref();
@@ -354,6 +422,9 @@ impl Game {
             }
         }
         let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
+        if let Some(levels) = &heart.levels {
+            return self.check_settled_levels(levels, &fresh, &settings);
+        }
         for position in extent.points() {
             let key = ChunkKey::finest(position);
             if let Some(chunk) = heart.samples().newest().chunk(position) {
@@ -366,7 +437,8 @@ impl Game {
             assert_eq!(state.is_some(), heart.table.is_leaf(key));
             let is_despawned = self.despawned.contains(&key) && heart.entity(key).is_none();
             if let Some(state) = state.filter(|_| !is_despawned) {
-                let expected = meshed(&fresh.neighbourhood_view(position), position, &settings).geometry;
+                let input = MeshInput::Finest(fresh.neighbourhood_view(position).to_neighbourhood());
+                let expected = meshed(&input, key, &settings).geometry;
                 let wanted = if expected.is_empty() { LeafState::Empty } else { LeafState::Drawn };
                 assert_eq!(state, wanted, "{position:?}");
                 if let Some(drawn) = heart.table.drawn(key).filter(|drawn| !drawn.geometry.is_empty()) {
@@ -378,11 +450,10 @@ impl Game {
     }
 }
 
-fn meshed(samples: &NeighbourhoodView<'_, i16>, position: [i32; 3], settings: &MeshSettings) -> ChunkMesh {
+fn meshed(input: &MeshInput, key: ChunkKey, settings: &MeshSettings) -> ChunkMesh {
     let mut geometry = MeshBuffer::new();
-    let mut block = marchless::Block::new();
-    samples.mesh(&mut Mesher::new(), &mut block, settings, &mut geometry).expect("samples of a chunk");
-    ChunkMesh { geometry: Arc::new(geometry), ..ChunkMesh::empty(position) }
+    input.mesh(&mut MeshScratch::default(), settings, &mut geometry).expect("samples of a chunk");
+    ChunkMesh { geometry: Arc::new(geometry), ..ChunkMesh::empty(key) }
 }
 
 proptest! {

@@ -84,6 +84,11 @@ impl ChunkTable {
         self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Unasked))
     }
 
+    /// Whether a job samples a chunk.
+    pub(in crate::volume) fn has_job(&self, key: ChunkKey) -> bool {
+        self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Asked(..)))
+    }
+
     pub(in crate::volume) fn is_dropped(&self, key: ChunkKey) -> bool {
         self.chunks.get(key).is_some_and(|entry| matches!(entry.fill, Fill::Dropped))
     }
@@ -113,9 +118,9 @@ impl ChunkTable {
         self.chunks.marks(key).waits && !self.is_surrounded(key)
     }
 
-    /// Whether a chunk and all existing chunks around it have their samples.
+    /// Whether a chunk and all existing chunks around it have their samples. Coarser leaves need none.
     pub(super) fn is_surrounded(&self, key: ChunkKey) -> bool {
-        self.chunks.is_surrounded(key, &self.extent)
+        key.level > 0 || self.chunks.is_surrounded(key, &self.extent)
     }
 
     /// Whether a chunk has reached everything that a residency asks for.

@@ -1,0 +1,159 @@
+//! Random events on a terrain with several levels of detail.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy_platform::collections::HashSet;
+use marchless::{LeafBlock, LevelCover, LevelSource, MeshUnion, Mesher};
+
+use super::super::levels::Levels;
+use super::*;
+
+impl Game {
+    fn with_levels(detail: LevelDetail) -> Self {
+        let mut game = Self { levels: Some(detail), ..Self::new() };
+        game.heart.set_levels(Some(detail));
+        game.keep();
+        game
+    }
+
+    /// Keeps the whole extent drawn, with several levels.
+    pub(super) fn keep(&mut self) {
+        let extent = self.settings.extent;
+        if self.levels.is_some() {
+            let view = View::new(LoadRegion::of_box(extent, extent), 0.0, None, [0.0; 3]);
+            self.heart.set_view(None, Some(view));
+        }
+    }
+
+    /// Another source, as the plugin changes it.
+    pub(super) fn start_over(&mut self, shift: f64) {
+        self.settings = sampling_settings(shift, self.settings.extent);
+        self.stamps.clear();
+        self.waiting.clear();
+        self.screen.clear();
+        self.despawned.clear();
+        self.heart = Heart::new(self.settings.clone(), self.isovalue, self.normals, colors(), true);
+        self.heart.set_levels(self.levels);
+        self.keep();
+        let mut viewers: Vec<u32> = self.views.keys().copied().collect();
+        viewers.sort_unstable();
+        viewers.into_iter().for_each(|viewer| self.appearance(viewer));
+    }
+
+    /// What holds in every update of a terrain with several levels.
+    pub(super) fn check_levels(&self, levels: &Levels) {
+        let heart = &self.heart;
+        let cover = levels.shown_cover();
+        let drawn: BTreeSet<ChunkKey> =
+            cover.leaves().filter(|(_, is_empty)| !is_empty).map(|(leaf, _)| leaf.into()).collect();
+        let leaves: BTreeSet<ChunkKey> = heart.table.keys().filter(|key| heart.table.is_leaf(*key)).collect();
+        assert_eq!(drawn, leaves, "what is drawn is in the cover");
+        assert!(leaves.iter().all(|key| heart.table.is_shown(*key)), "a leaf is drawn as soon as it is one");
+        for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
+            for (near, _) in cover.leaves_near(leaf.region()).into_iter().filter(|(_, is_empty)| !is_empty) {
+                assert!(near.level.abs_diff(leaf.level) <= 1, "{near:?} touches {leaf:?}");
+            }
+        }
+        let extent = self.settings.extent;
+        let is_whole = extent.points().all(|chunk| cover.leaf_at(chunk).is_some());
+        if is_whole && self.despawned.is_empty() {
+            self.check_closed();
+        }
+    }
+
+    /// Checks that all meshes on the screen form one closed surface, bit for bit.
+    fn check_closed(&self) {
+        // Crossings are at multiples of 2⁻¹⁴ voxels of the level of their samples.
+        let unit = f64::from(1 << 14);
+        let mut edges = HashSet::<[[i64; 3]; 2]>::default();
+        let mut positions = Vec::new();
+        for (key, mesh) in self.screen.values() {
+            let corner = key.position.map(|v| f64::from(v) * f64::from(CELLS));
+            let size = f64::from(1 << key.level);
+            let point = |p: &[f32; 3]| [0, 1, 2].map(|axis| ((corner[axis] + f64::from(p[axis])) * size * unit) as i64);
+            positions.clear();
+            positions.extend(mesh.positions.iter().map(point));
+            for triangle in mesh.indices.chunks_exact(3) {
+                let [a, b, c] = [0, 1, 2].map(|corner| positions[triangle[corner] as usize]);
+                for edge in [[a, b], [b, c], [c, a]] {
+                    // The edge that runs the other way matches it.
+                    if !edges.remove(&[edge[1], edge[0]]) {
+                        assert!(edges.insert(edge), "an edge twice, at {edge:?} of {key:?}");
+                    }
+                }
+            }
+        }
+        assert!(edges.is_empty(), "{} open edges, one at {:?}", edges.len(), edges.iter().next());
+    }
+
+    /// Once nothing waits, all is as in a fresh terrain with the same edits.
+    pub(super) fn check_settled_levels(&self, levels: &Levels, fresh: &Grid<i16>, settings: &MeshSettings) {
+        let cover = levels.shown_cover();
+        let known = fresh.chunks_in(self.settings.extent).collect::<BTreeMap<_, _>>();
+        let source = LevelSource {
+            source: self.settings.source.as_ref(),
+            cells: CELLS,
+            spacing: 1.0,
+            stamps: &self.stamps,
+            known: None,
+            planes: fresh.planes(),
+            isovalue: self.isovalue,
+        };
+        let (viewers, level_settings) = levels.asked();
+        let asked = LevelCover::new(&viewers, &level_settings, None, |leaf| levels.is_empty(leaf)).expect("few leaves");
+        assert!(level_settings.hysteresis > 0.0 || asked.leaves().eq(cover.leaves()), "the cover that viewers ask for");
+        let (mut mesher, mut block, mut union) = (Mesher::new(), LeafBlock::new(), MeshUnion::new());
+        let is_despawned = |key: &ChunkKey| self.despawned.contains(key) && self.heart.entity(*key).is_none();
+        for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
+            let key = ChunkKey::from(leaf);
+            let mut expected = MeshBuffer::new();
+            block.fill(&source, cover, leaf);
+            mesher.mesh_leaf(&block.samples().expect("one answer"), settings, &mut expected).expect("a leaf");
+            union.add(&expected, leaf.region().min.map(|v| i64::from(v) * i64::from(CELLS)), leaf.level);
+            if is_despawned(&key) {
+                continue;
+            }
+            let wanted = if expected.is_empty() { LeafState::Empty } else { LeafState::Drawn };
+            assert_eq!(self.heart.table.leaf_state(key), Some(wanted), "{key:?}");
+            if let Some(drawn) = self.heart.table.drawn(key).filter(|drawn| !drawn.geometry.is_empty()) {
+                assert!(*drawn.geometry == expected, "the mesh of {key:?}");
+                assert_eq!(drawn.appearance, self.heart.appearance(), "the appearance of {key:?}");
+            }
+        }
+        assert!(union.report().is_closed(), "{}", union.report());
+        let finest = self.settings.extent.points().filter(|chunk| self.heart.table.contains(ChunkKey::finest(*chunk)));
+        for chunk in finest.filter(|chunk| self.heart.samples.is_resident(*chunk)) {
+            let (found, expected) = (self.heart.samples.newest().chunk(chunk).expect("it is resident"), known[&chunk]);
+            assert!((0..CELLS.pow(3) as usize).all(|index| found.voxel(index) == expected.voxel(index)), "{chunk:?}");
+        }
+    }
+}
+
+fn detail() -> impl Strategy<Value = LevelDetail> {
+    (2u8..5, 1.75..2.5f64, prop_oneof![Just(0.0), Just(0.1)]).prop_map(|(levels, falloff, hysteresis)| LevelDetail {
+        levels,
+        falloff,
+        hysteresis,
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn whatever_happens_the_surface_is_closed(
+        detail in detail(),
+        events in prop::collection::vec(event(), 1..50),
+    ) {
+        let mut game = Game::with_levels(detail);
+        for event in &events {
+            game.happen(event);
+        }
+        game.follow_residency();
+        // And again, from there.
+        for event in events.iter().rev() {
+            game.happen(event);
+        }
+        game.follow_residency();
+    }
+}
