@@ -4,16 +4,50 @@ use std::time::{Duration, Instant};
 
 use bevy_diagnostic::{DiagnosticPath, DiagnosticsStore};
 use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
-use bevy_marchless::marchless::GridChunk;
+use bevy_marchless::marchless::{GridChunk, Region};
 use bevy_marchless::prelude::*;
 use bevy_marchless::stats::TerrainStats;
+use bevy_marchless::stream::LeafState;
 use bevy_math::{IVec3, Vec3};
 use marchless_plugin_benches::{Game, PACE, Times, World, resident_bytes};
 
 use crate::route::{ROUTES, Route};
 
-/// A viewer's radius of view: 8 chunks.
-const RADIUS: f32 = 256.0;
+/// How far viewers see.
+#[derive(Clone, Copy)]
+pub(crate) enum Sight {
+    /// 8 chunks, at one level of detail.
+    Near,
+    /// 4,096 voxels, at six levels.
+    Far,
+}
+
+/// Within this distance the ground is to be complete soon after a teleport. [Units: voxels]
+const CLOSE: i32 = 128;
+
+impl Sight {
+    /// What it adds to the name of a flight.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Near => "",
+            Self::Far => " to 4,096 voxels",
+        }
+    }
+
+    fn viewer(self) -> TerrainViewer {
+        TerrainViewer::new(match self {
+            Self::Near => 256.0,
+            Self::Far => 4_096.0,
+        })
+    }
+
+    fn terrain(self, world: World) -> Terrain {
+        match self {
+            Self::Near => world.terrain(),
+            Self::Far => world.terrain().with_levels(6),
+        }
+    }
+}
 
 /// The measurements of a flight.
 pub(crate) struct Flight {
@@ -21,6 +55,8 @@ pub(crate) struct Flight {
     pub(crate) updates: Times,
     /// Updates until the first view was complete, and after each teleport; the last may not be complete.
     pub(crate) complete: Vec<u32>,
+    /// The same for everything within [`CLOSE`] voxels.
+    pub(crate) close: Vec<u32>,
     /// The most leaves in range that were pending at once, except after teleports.
     pub(crate) waiting: usize,
     /// The work done after the first view was complete.
@@ -35,18 +71,25 @@ pub(crate) struct Flight {
 impl Flight {
     /// Flies for so many updates. If `paced`, the flight runs at sixty updates a second and starts when the first view
     /// is complete.
-    pub(crate) fn fly(world: World, route: &Route, updates: u32, paced: bool) -> Self {
-        let mut game = Game::new(world.terrain(), paced);
-        let viewers: Vec<_> = (0..route.viewers)
-            .map(|viewer| game.spawn_viewer(TerrainViewer::new(RADIUS), route.transform(0, viewer)))
-            .collect();
-        let mut complete = Vec::new();
+    pub(crate) fn fly(world: World, sight: Sight, route: &Route, updates: u32, paced: bool) -> Self {
+        let mut game = Game::new(sight.terrain(world), paced);
+        let viewers: Vec<_> =
+            (0..route.viewers).map(|viewer| game.spawn_viewer(sight.viewer(), route.transform(0, viewer))).collect();
+        let (mut complete, mut close) = (Vec::new(), Vec::new());
         if paced {
             let (times, _) = game.settle(20 * PACE);
             complete.push(times.count() as u32);
+            eprintln!(
+                "FIRST meshed {} filled {} drawn {:?} mesh_time {:?} fill_time {:?}",
+                stats(&game).meshed,
+                stats(&game).filled,
+                game.volume().coverage(),
+                stats(&game).mesh_time,
+                stats(&game).fill_time
+            );
         }
         let (before, start) = (stats(&game), Instant::now());
-        let (mut times, mut waiting, mut waits_since) = (Vec::new(), 0, None);
+        let (mut times, mut waiting, mut waits_since, mut close_since) = (Vec::new(), 0, None, None);
         for update in 0..updates {
             for (number, viewer) in viewers.iter().enumerate() {
                 game.place(*viewer, route.transform(update, number));
@@ -56,9 +99,15 @@ impl Flight {
             }
             if route.teleports(update) {
                 complete.extend(waits_since.map(|since| update - since));
-                waits_since = Some(update);
+                (waits_since, close_since) = (Some(update), Some(update));
             }
             times.push(game.update());
+            if let Some(since) = close_since
+                && is_drawn_around(&game, route.transform(update, 0).translation)
+            {
+                close.push(update + 1 - since);
+                close_since = None;
+            }
             match waits_since {
                 Some(since) if game.is_settled() => {
                     complete.push(update + 1 - since);
@@ -81,6 +130,7 @@ impl Flight {
         Self {
             updates: times.into_iter().collect(),
             complete,
+            close,
             waiting,
             stats,
             time,
@@ -90,11 +140,25 @@ impl Flight {
     }
 }
 
+/// Whether the finest level is drawn, or known to be empty, around a place.
+fn is_drawn_around(game: &Game, place: Vec3) -> bool {
+    let [low, high] = [-CLOSE, CLOSE].map(|by| ((place.as_ivec3() + by).as_vec3() / 32.0).floor().as_ivec3());
+    let chunks = Region::new(low.to_array(), (high + 1).to_array());
+    let is_near = |chunk: [i32; 3]| {
+        let low = IVec3::from(chunk).as_vec3() * 32.0;
+        place.clamp(low, low + 32.0).distance(place) < CLOSE as f32
+    };
+    chunks.points().filter(|chunk| is_near(*chunk)).all(|chunk| {
+        let leaf = game.volume().leaf_at(chunk.into());
+        leaf.is_some_and(|leaf| leaf.state == LeafState::Empty || leaf.state == LeafState::Drawn && leaf.level == 0)
+    })
+}
+
 /// Flies straight for minutes over the hills, digging, and tells how memory grows.
 pub(crate) fn long_flight(minutes: u32) -> String {
     let route = &ROUTES[0];
     let mut game = Game::new(World::Hills.terrain(), true);
-    let viewer = game.spawn_viewer(TerrainViewer::new(RADIUS), route.transform(0, 0));
+    let viewer = game.spawn_viewer(Sight::Near.viewer(), route.transform(0, 0));
     let mut text = String::from(
         "| minute | resident MB | of it edits | p99 ms | max ms | chunks loaded |\n|---|---|---|---|---|---|\n",
     );

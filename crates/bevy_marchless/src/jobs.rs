@@ -26,6 +26,8 @@ pub(crate) enum Priority {
     FirstMesh(u32),
     /// Sampling a chunk.
     Fill(u32),
+    /// Meshing a leaf of a change of levels, by the change's number. Samples come first: changes wait for them.
+    Level(u64),
 }
 
 /// The jobs that wait for a thread. Dropping the queue drops them.

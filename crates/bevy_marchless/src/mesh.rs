@@ -253,12 +253,12 @@ impl MeshUpdate<'_, '_, '_> {
         while (done == 0 || Instant::now() < self.until)
             && let Some(jobs) = terrain.heart.next_level_jobs(self.in_flight)
         {
-            let (change, attempt, urgency) = (jobs.change, jobs.attempt(), jobs.urgency);
+            let (change, attempt) = (jobs.change, jobs.attempt());
             let settings = terrain.heart.mesh_settings();
             let style = self.presenter.style(terrain.heart.colors());
             let job = |(key, input)| {
                 let (results, style) = (terrain.heart.mesh_results().clone(), style.clone());
-                self.queue.push(Priority::FirstMesh(urgency), move || {
+                self.queue.push(Priority::Level(change), move || {
                     let meshed = mesh_chunk(&input, key, &settings, style.as_ref(), None);
                     results.push(MeshResult::OfLevels(LevelJobs::result(change, attempt, meshed)));
                 })

@@ -205,7 +205,15 @@ impl LevelCover {
         if leaf.level == 0 {
             return FinerNeighbours::NONE;
         }
-        FinerNeighbours::from_fn(|direction| neighbour(leaf, direction).is_some_and(|place| self.is_split(place)))
+        if leaf.level > self.top {
+            return FinerNeighbours::NONE;
+        }
+        let near = self.near(leaf);
+        let is_split = |place: LeafKey| {
+            let node = near.node_over(place);
+            node.is_some_and(|(_, node)| node.key == place && matches!(node.state, State::Split { .. }))
+        };
+        FinerNeighbours::from_fn(|direction| neighbour(leaf, direction).is_some_and(is_split))
     }
 }
 

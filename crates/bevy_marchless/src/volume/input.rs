@@ -30,21 +30,23 @@ pub(crate) struct LeafInput {
     pub(super) cover: LaterCover,
 }
 
-/// A cover as it will be after a change. Making it takes a while, so the first job that needs it does so.
+/// A cover as it will be after some changes. Making it takes a while, so the first job that needs it does so.
 #[derive(Clone)]
-pub(crate) struct LaterCover(Arc<(Arc<LevelCover>, Option<Arc<LevelChange>>, OnceLock<LevelCover>)>);
+pub(crate) struct LaterCover(Arc<(Arc<LevelCover>, Vec<Arc<LevelChange>>, OnceLock<LevelCover>)>);
 
 impl LaterCover {
-    pub(crate) fn new(cover: Arc<LevelCover>, change: Option<Arc<LevelChange>>) -> Self {
-        Self(Arc::new((cover, change, OnceLock::new())))
+    pub(crate) fn new(cover: Arc<LevelCover>, changes: Vec<Arc<LevelChange>>) -> Self {
+        Self(Arc::new((cover, changes, OnceLock::new())))
     }
 
     fn get(&self) -> &LevelCover {
-        let (cover, change, later) = &*self.0;
-        let Some(change) = change else { return cover };
+        let (cover, changes, later) = &*self.0;
+        if changes.is_empty() {
+            return cover;
+        }
         later.get_or_init(|| {
             let mut later = LevelCover::clone(cover);
-            later.apply(change);
+            changes.iter().for_each(|change| later.apply(change));
             later
         })
     }

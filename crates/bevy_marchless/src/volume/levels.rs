@@ -8,6 +8,7 @@
 //! shown, and waits while an edit of its leaves is being meshed. An edit in a box that was empty splits it in the same
 //! update.
 
+mod cache;
 mod plan;
 mod surfaces;
 
@@ -24,12 +25,15 @@ use super::{ChunkTable, Heart, SamplingSettings};
 use crate::chunk::ChunkKey;
 use crate::cover::{Coverage, Leaf, LeafState, Residency, View, ViewId};
 use crate::jobs::{Results, Ticket, new_number};
+use cache::CachedSource;
 use plan::Plan;
 pub(crate) use plan::{PlanJob, Planned};
 use surfaces::Surfaces;
 
 /// The most changes under way.
-const MAX_RUNNING: usize = 64;
+const MAX_RUNNING: usize = 48;
+/// A viewer that has moved farther than this since the last plan makes what is planned useless. [Units: chunks]
+const JUMP: f64 = 4.0;
 
 /// How detail falls off with distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,13 +56,18 @@ pub(super) struct Levels {
     /// The job that computes another plan.
     planning: Option<(u64, Ticket)>,
     planned: Results<Planned>,
-    /// Whether viewers have moved, or boxes have got a surface, since the plan was requested.
+    /// The viewers for whom the plan was made.
+    planned_for: BTreeMap<ViewId, LevelViewer>,
+    /// Whether viewers have moved since the plan was requested.
     is_outdated: bool,
+    /// Whether what is planned is useless.
+    has_jumped: bool,
     /// The changes under way, in the order in which they started.
     running: BTreeMap<u64, Running>,
     /// The leaves of the finest level with a surface: those drawn (`true`), and those to be drawn.
     finest: HashMap<[i32; 3], bool>,
     surfaces: Arc<Surfaces>,
+    source: Arc<CachedSource>,
     /// The settings for which there would be too many leaves, if that has been reported.
     has_too_many: bool,
 }
@@ -66,10 +75,7 @@ pub(super) struct Levels {
 /// A change under way.
 struct Running {
     change: Arc<LevelChange>,
-    urgency: u32,
-    /// The planned changes that wait for it.
-    next: Vec<usize>,
-    /// The changes under way that it waits for.
+    /// The changes that are to be shown before it.
     after: Vec<u64>,
     /// Whether it is to be shown in this update, as far as possible.
     is_urgent: bool,
@@ -100,7 +106,6 @@ pub(crate) struct LevelMesh {
 pub(crate) struct LevelJobs {
     pub(crate) change: u64,
     attempt: u64,
-    pub(crate) urgency: u32,
     pub(crate) inputs: Vec<(ChunkKey, MeshInput)>,
 }
 
@@ -143,15 +148,18 @@ fn finest(change: &LevelChange) -> impl Iterator<Item = [i32; 3]> + '_ {
 }
 
 impl Levels {
-    fn new(detail: LevelDetail, sampling: &SamplingSettings, surfaces: Option<&Surfaces>) -> Self {
+    /// `former`: of the same samples, before a change of the extent.
+    fn new(detail: LevelDetail, sampling: &SamplingSettings, former: Option<&Self>) -> Self {
         let LevelDetail { levels, falloff, hysteresis } = detail;
         let kept = Region::new([0; 3], [0; 3]);
         let settings = LevelSettings { levels, falloff, hysteresis, extent: sampling.extent, kept };
         let planes = sampling.empty_grid().planes();
-        let surfaces = match surfaces {
-            Some(former) => former.with_planes(planes),
+        let surfaces = match former {
+            Some(former) => former.surfaces.with_planes(planes),
             None => Surfaces::new(sampling, planes),
         };
+        let new_source = || Arc::new(CachedSource::new(sampling.source.clone()));
+        let source = former.map_or_else(new_source, |former| former.source.clone());
         Self {
             detail,
             settings,
@@ -161,10 +169,13 @@ impl Levels {
             plan: Plan::default(),
             planning: None,
             planned: Results::default(),
+            planned_for: BTreeMap::new(),
             is_outdated: false,
+            has_jumped: false,
             running: BTreeMap::new(),
             finest: HashMap::default(),
             surfaces: Arc::new(surfaces),
+            source,
             has_too_many: false,
         }
     }
@@ -181,6 +192,14 @@ impl Levels {
             None => _ = self.viewers.remove(&id),
         }
         self.is_outdated = true;
+        let is_near = |now: &LevelViewer, then: &LevelViewer| {
+            let has_moved = |axis: usize| (now.position[axis] - then.position[axis]).abs() > JUMP;
+            now.distance == then.distance && !(0..3).any(has_moved)
+        };
+        self.has_jumped |= match (self.viewers.get(&id), self.planned_for.get(&id)) {
+            (Some(now), Some(then)) => !is_near(now, then),
+            (now, then) => id.is_none() || now.is_some() || then.is_some(),
+        };
     }
 
     /// The residency that a chunk of the finest level needs.
@@ -194,7 +213,7 @@ impl Levels {
 
     /// Whether the leaves are those that viewers ask for.
     pub(super) fn is_idle(&self) -> bool {
-        !self.is_outdated && self.planning.is_none() && self.plan.left() == 0 && self.running.is_empty()
+        !self.is_outdated && self.planning.is_none() && self.plan.is_done() && self.running.is_empty()
     }
 
     /// Whether changes may start, or be shown.
@@ -205,6 +224,11 @@ impl Levels {
     /// The number of meshes of changes under way and of those to come.
     pub(super) fn waiting_for_meshes(&self) -> usize {
         self.running.values().map(|running| running.members().count()).sum::<usize>() + self.plan.left()
+    }
+
+    /// The memory of the samples of coarser leaves, in bytes.
+    pub(super) fn sample_bytes(&self) -> usize {
+        self.source.bytes()
     }
 
     fn viewers(&self) -> Vec<LevelViewer> {
@@ -257,6 +281,47 @@ impl Levels {
         leaves.map(|(leaf, _)| leaf.into()).filter(|key| self.reads(*key, points, cells)).collect()
     }
 
+    /// Takes in that chunks of the finest level are not drawn any more, or do not come with a change that was withdrawn.
+    fn leave_finest(&mut self, positions: &[[i32; 3]], were_drawn: bool) {
+        for position in positions {
+            if !were_drawn && self.finest.get(position) == Some(&true) {
+                continue;
+            }
+            if self.running.values().any(|running| running.finest().any(|coming| coming == *position)) {
+                self.finest.insert(*position, false);
+            } else {
+                self.finest.remove(position);
+            }
+        }
+    }
+
+    /// A change under way, and those that are to be shown before it, in order.
+    fn until(&self, id: u64) -> Vec<Arc<LevelChange>> {
+        let mut all = BTreeMap::new();
+        let mut to_visit = vec![id];
+        while let Some(id) = to_visit.pop() {
+            if let Some(running) = self.running.get(&id).filter(|_| !all.contains_key(&id)) {
+                all.insert(id, running.change.clone());
+                to_visit.extend(&running.after);
+            }
+        }
+        all.into_values().collect()
+    }
+
+    /// Withdraws a change under way and all that would be shown after it. Returns their new leaves of the finest level.
+    fn withdraw(&mut self, id: u64) -> Vec<[i32; 3]> {
+        let mut gone = BTreeSet::from([id]);
+        for (later, running) in self.running.range(id..) {
+            if running.after.iter().any(|before| gone.contains(before)) {
+                gone.insert(*later);
+            }
+        }
+        gone.iter()
+            .filter_map(|id| self.running.remove(id))
+            .flat_map(|running| running.finest().collect::<Vec<_>>())
+            .collect()
+    }
+
     /// Notes that edits have changed lattice points: meshes that were made before are out of date.
     fn note_edit(&mut self, points: Region, cells: u32) {
         let mut running = core::mem::take(&mut self.running);
@@ -296,9 +361,9 @@ impl Heart {
     /// Begins anew after a change of the extent; edits stay.
     pub(super) fn restart_levels(&mut self) {
         let (Some(levels), Some(sampling)) = (&self.levels, &self.sampling_settings) else { return };
-        let mut anew = Levels::new(levels.detail, sampling, Some(&levels.surfaces));
+        let mut anew = Levels::new(levels.detail, sampling, Some(levels));
         anew.viewers.clone_from(&levels.viewers);
-        (anew.settings.kept, anew.is_outdated) = (levels.settings.kept, true);
+        (anew.settings.kept, anew.is_outdated, anew.has_jumped) = (levels.settings.kept, true, true);
         self.drop_leaves();
         self.levels = Some(anew);
     }
@@ -332,11 +397,21 @@ impl Heart {
 
     /// Whether a plan is to be computed.
     pub(crate) fn has_to_plan(&self) -> bool {
-        self.levels.as_ref().is_some_and(|levels| levels.is_outdated && levels.planning.is_none())
+        // While viewers move, what was planned is still nearly right.
+        let is_due = |levels: &Levels| levels.has_jumped || levels.plan.is_short(levels.is_outdated);
+        self.levels.as_ref().is_some_and(|levels| levels.planning.is_none() && is_due(levels))
     }
 
     /// Requests a plan. `start` starts the job, with the queue for its result.
     pub(crate) fn start_plan(&mut self, start: impl FnOnce(PlanJob, Results<Planned>) -> Ticket) {
+        let Some(levels) = &mut self.levels else { return };
+        if core::mem::take(&mut levels.has_jumped) {
+            let waiting = levels.running.iter().filter(|(_, running)| running.meshing.is_none() && !running.is_urgent);
+            let waiting: Vec<u64> = waiting.map(|(id, _)| *id).collect();
+            let left: Vec<_> = waiting.into_iter().flat_map(|id| levels.withdraw(id)).collect();
+            levels.leave_finest(&left, false);
+            self.leaving_around(&left);
+        }
         let Some(levels) = &mut self.levels else { return };
         let number = new_number();
         let job = PlanJob {
@@ -349,9 +424,9 @@ impl Heart {
             surfaces: levels.surfaces.clone(),
         };
         levels.is_outdated = false;
+        levels.planned_for.clone_from(&levels.viewers);
         // What was planned so far ends here, so that the new plan begins where it did.
         levels.plan = Plan::default();
-        levels.running.values_mut().for_each(|running| running.next.clear());
         levels.planning = Some((number, start(job, levels.planned.clone())));
     }
 
@@ -368,12 +443,6 @@ impl Heart {
                     levels.has_too_many = false;
                     levels.target.clone_from(&plan.target);
                     levels.plan = plan;
-                    for (id, next) in levels.plan.take_after_running() {
-                        match levels.running.get_mut(&id) {
-                            Some(running) => running.next = next,
-                            None => levels.plan.shown(next),
-                        }
-                    }
                 }
                 Err(error) => {
                     if !core::mem::replace(&mut levels.has_too_many, true) {
@@ -388,15 +457,18 @@ impl Heart {
     pub(crate) fn start_level_changes(&mut self) {
         let Some(levels) = &mut self.levels else { return };
         let mut coming = Vec::new();
-        while levels.running.len() < MAX_RUNNING
-            && let Some((change, urgency, next)) = levels.plan.start_next()
-        {
+        loop {
+            let id = new_number();
+            if levels.running.len() >= MAX_RUNNING {
+                break;
+            }
+            let Some((change, after)) = levels.plan.start_next(id) else { break };
             for position in finest(&change) {
-                levels.finest.insert(position, false);
+                levels.finest.entry(position).or_insert(false);
                 coming.push(position);
             }
-            let running = Running { change, urgency, next, after: Vec::new(), is_urgent: false, meshing: None };
-            levels.running.insert(new_number(), running);
+            let running = Running { change, after, is_urgent: false, meshing: None };
+            levels.running.insert(id, running);
         }
         self.load_around(&coming);
     }
@@ -422,16 +494,16 @@ impl Heart {
             }
             let may_begin = |running: &Running| {
                 let has_samples = || running.finest().all(|position| self.is_surrounded(position));
-                running.meshing.is_none() && !running.is_urgent && self.is_next(running) && has_samples()
+                running.meshing.is_none() && !running.is_urgent && has_samples()
             };
-            let ready = levels.running.iter().filter(|(_, running)| may_begin(running));
-            let change = *ready.min_by_key(|(_, running)| running.urgency)?.0;
+            // In the order in which they are to be shown, where that matters.
+            let change = *levels.running.iter().find(|(_, running)| may_begin(running))?.0;
             let inputs = self.begin_meshing(change, makes_meshes);
             let levels = self.levels.as_ref()?;
             let running = levels.running.get(&change)?;
             let attempt = running.meshing.as_ref()?.attempt;
             if !inputs.is_empty() {
-                return Some(LevelJobs { change, attempt, urgency: running.urgency, inputs });
+                return Some(LevelJobs { change, attempt, inputs });
             }
         }
     }
@@ -451,7 +523,7 @@ impl Heart {
     fn begin_meshing(&mut self, id: u64, makes_meshes: bool) -> Vec<(ChunkKey, MeshInput)> {
         let Some(levels) = &self.levels else { return Vec::new() };
         let Some(running) = levels.running.get(&id) else { return Vec::new() };
-        let cover = LaterCover::new(levels.shown.clone(), Some(running.change.clone()));
+        let cover = LaterCover::new(levels.shown.clone(), levels.until(id));
         let all: Vec<ChunkKey> = if makes_meshes { running.members().collect() } else { Vec::new() };
         let is_empty = |key: &ChunkKey| {
             key.level == 0
@@ -528,7 +600,7 @@ impl Heart {
     pub(crate) fn show_level_change(&mut self, id: u64, at_once: Vec<ChunkMesh>) -> Shown {
         let mut shown = Shown::default();
         let Some(running) = self.levels.as_mut().and_then(|levels| levels.running.remove(&id)) else { return shown };
-        let Running { change, next, meshing: Some(meshing), .. } = running else { return shown };
+        let Running { change, meshing: Some(meshing), .. } = running else { return shown };
         let mut left = Vec::new();
         for leaf in &change.removed {
             self.drop_leaf((*leaf).into());
@@ -544,10 +616,9 @@ impl Heart {
             }
         }
         if let Some(levels) = &mut self.levels {
-            left.iter().for_each(|position| _ = levels.finest.remove(position));
+            levels.leave_finest(&left, true);
             levels.finest.extend(finest(&change).map(|position| (position, true)));
             Arc::make_mut(&mut levels.shown).apply(&change);
-            levels.plan.shown(next);
         }
         let remade: BTreeSet<ChunkKey> = at_once.iter().map(|meshed| meshed.key).collect();
         let Meshing { appearance, meshed, .. } = meshing;
@@ -565,28 +636,35 @@ impl Heart {
             }
         }
         members(&change).for_each(|key| self.shown(key));
-        for near in left.iter().flat_map(|position| ChunkKey::finest(*position).around()) {
+        self.leaving_around(&left);
+        shown
+    }
+
+    /// Notes that chunks of the finest level, and those around them, may not be needed any more.
+    fn leaving_around(&mut self, positions: &[[i32; 3]]) {
+        for near in positions.iter().flat_map(|position| ChunkKey::finest(*position).around()) {
             if self.table.contains(near) {
                 self.leaving.push(near);
             }
         }
-        shown
     }
 
     /// What a chunk's mesh is made from now.
     pub(crate) fn mesh_input(&self, key: ChunkKey) -> MeshInput {
         match &self.levels {
-            Some(levels) if key.level > 0 => self.input(key, &LaterCover::new(levels.shown.clone(), None)),
+            Some(levels) if key.level > 0 => self.input(key, &LaterCover::new(levels.shown.clone(), Vec::new())),
             _ => MeshInput::Finest(self.samples.neighbourhood(key.position).to_neighbourhood()),
         }
     }
 
     /// What a leaf's mesh is made from in a cover.
     fn input(&self, key: ChunkKey, cover: &LaterCover) -> MeshInput {
-        let settings = self.sampling_settings.as_ref().filter(|_| key.level > 0);
-        let Some(SamplingSettings { source, cells, spacing, .. }) = settings.cloned() else {
+        let levels = self.levels.as_ref().filter(|_| key.level > 0);
+        let Some((levels, &SamplingSettings { cells, spacing, .. })) = levels.zip(self.sampling_settings.as_ref())
+        else {
             return MeshInput::Finest(self.samples.neighbourhood(key.position).to_neighbourhood());
         };
+        let source = levels.source.clone();
         let leaf = LeafKey::from(key);
         let (stamps, known) = self.samples.edits_around(leaf);
         let planes = self.samples.newest().planes();
@@ -616,7 +694,7 @@ impl Heart {
             .collect();
         // Changes to come may add leaves that were empty when they were planned.
         levels.plan = Plan::default();
-        (levels.planning, levels.is_outdated) = (None, true);
+        (levels.planning, levels.is_outdated, levels.has_jumped) = (None, true, true);
         let viewers = levels.viewers();
         let change = match cover.fill(&filled, &viewers, &levels.settings, |leaf| surfaces.is_empty(leaf)) {
             Ok(change) => Arc::new(change),
@@ -630,28 +708,21 @@ impl Heart {
             levels.running.iter().filter(|(_, running)| is_out_of_date(running)).map(|(id, _)| *id).collect();
         let mut after = Vec::new();
         let mut left = Vec::new();
-        for running in levels.running.values_mut() {
-            running.next.clear();
-        }
         for id in overlapping {
             if levels.running.get(&id).is_some_and(|running| running.is_urgent) {
                 after.push(id);
-            } else if let Some(running) = levels.running.remove(&id) {
-                left.extend(running.finest());
+            } else {
+                left.extend(levels.withdraw(id));
             }
         }
         let coming: Vec<[i32; 3]> = finest(&change).collect();
-        left.iter().for_each(|position| _ = levels.finest.remove(position));
-        levels.finest.extend(coming.iter().map(|position| (*position, false)));
+        levels.leave_finest(&left, false);
+        coming.iter().for_each(|position| _ = levels.finest.entry(*position).or_insert(false));
         if !filled.is_empty() {
-            let running = Running { change, urgency: 0, next: Vec::new(), after, is_urgent: true, meshing: None };
+            let running = Running { change, after, is_urgent: true, meshing: None };
             levels.running.insert(new_number(), running);
         }
-        for near in left.iter().flat_map(|position| ChunkKey::finest(*position).around()) {
-            if self.table.contains(near) {
-                self.leaving.push(near);
-            }
-        }
+        self.leaving_around(&left);
         let near: BTreeSet<ChunkKey> =
             coming.iter().flat_map(|position| ChunkKey::finest(*position).around()).collect();
         for near in near.into_iter().filter(|near| extent.contains(near.position)) {

@@ -6,9 +6,9 @@ use super::Heart;
 use super::samples::shares_samples;
 
 impl Heart {
-    /// The memory that the records of chunks take, in bytes.
+    /// The memory that the records of chunks take, in bytes, and that of coarser leaves' samples.
     pub(crate) fn notes_bytes(&self) -> usize {
-        self.table.bytes()
+        self.table.bytes() + self.levels.as_ref().map_or(0, super::Levels::sample_bytes)
     }
 
     /// The memory that the samples of at most `most` chunks take, in bytes, starting at a position; and the position to

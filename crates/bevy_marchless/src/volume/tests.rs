@@ -305,11 +305,11 @@ impl Game {
         }
         self.heart.start_level_changes();
         while let Some(jobs) = self.heart.next_level_jobs(8) {
-            let (change, attempt, urgency) = (jobs.change, jobs.attempt(), jobs.urgency);
+            let (change, attempt) = (jobs.change, jobs.attempt());
             let settings = self.heart.mesh_settings();
             let job = |(key, input)| {
                 let results = self.heart.mesh_results().clone();
-                self.queue.push(Priority::FirstMesh(urgency), move || {
+                self.queue.push(Priority::Level(change), move || {
                     let meshed = meshed(&input, key, &settings);
                     results.push(MeshResult::OfLevels(LevelJobs::result(change, attempt, meshed)));
                 })

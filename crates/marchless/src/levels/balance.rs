@@ -31,22 +31,16 @@ pub(super) fn balance(cover: &mut LevelCover, builder: &mut Builder<'_>) -> Resu
     Ok(())
 }
 
-/// Whether a leaf with a surface fits those that touch it, as far as it can see: none is more than one level coarser,
-/// and finer and coarser ones alternate at none of its edges.
-pub(super) fn fits(cover: &LevelCover, leaf: LeafKey) -> bool {
-    !alternates(cover, leaf) && too_coarse(cover, leaf).is_none()
-}
-
 /// The 26 directions to a leaf's neighbours.
 fn directions() -> impl Iterator<Item = [i32; 3]> {
     (0..27).map(|place| [place % 3 - 1, place / 3 % 3 - 1, place / 9 - 1]).filter(|direction| *direction != [0; 3])
 }
 
 /// A leaf with a surface that touches this one and is more than one level coarser.
-fn too_coarse(cover: &LevelCover, leaf: LeafKey) -> Option<u32> {
+pub(super) fn too_coarse(cover: &LevelCover, leaf: LeafKey) -> Option<u32> {
+    let near = cover.near(leaf);
     directions().find_map(|direction| {
-        let index = cover.index_over(neighbour(leaf, direction)?)?;
-        let node = &cover.nodes[index as usize];
+        let (index, node) = near.node_over(neighbour(leaf, direction)?)?;
         (matches!(node.state, State::Leaf) && node.key.level > leaf.level + 1).then_some(index)
     })
 }

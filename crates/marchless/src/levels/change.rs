@@ -1,13 +1,17 @@
 //! [`LevelChange`]: from one cover to another, a few leaves at a time.
 
-use alloc::vec::Vec;
+use alloc::{vec, vec::Vec};
 
 use super::{
     LeafKey, LevelCover,
-    balance::fits,
+    balance::too_coarse,
     tree::{Node, State},
 };
 use crate::{lattice::Region, mesher::FinerNeighbours};
+
+/// The most steps of a change, and how many times another step may not fit before it stays as it is.
+const MOST_STEPS: usize = 12;
+const MOST_FAILURES: usize = 2;
 
 /// A change of a few leaves of a [`LevelCover`] that can be shown at once: nothing is then uncovered, covered twice or
 /// cracked.
@@ -29,15 +33,20 @@ impl LevelChange {
         if !touch(&self.region(), &other.region()) {
             return false;
         }
-        let touched = |change: &Self| change.leaves().map(|leaf| leaf.region()).collect::<Vec<_>>();
-        let (ours, theirs) = (touched(self), touched(other));
-        ours.iter().any(|a| theirs.iter().any(|b| touch(a, b)))
+        let theirs = other.region();
+        let ours = self.leaves().map(LeafKey::region).filter(|ours| touch(ours, &theirs));
+        ours.into_iter().any(|ours| other.leaves().any(|theirs| touch(&ours, &theirs.region())))
     }
 
     /// The box around all leaves that the change mentions, in chunks of level 0.
     pub fn region(&self) -> Region {
         let regions = self.leaves().map(LeafKey::region);
         regions.reduce(|a, b| a.union(&b)).unwrap_or(Region::new([0; 3], [0; 3]))
+    }
+
+    /// The number of leaves that are to be meshed.
+    fn meshes(&self) -> usize {
+        self.added.iter().filter(|(_, is_empty)| !is_empty).count() + self.remeshed.len()
     }
 
     /// All leaves that the change mentions.
@@ -71,7 +80,15 @@ impl Step {
     }
 }
 
-/// What takes a [`Step`] back. The nodes that it made stay, unused.
+/// Steps that have been made, and how to take them back.
+struct Made {
+    change: LevelChange,
+    undo: Vec<Undo>,
+    /// The number of nodes before.
+    nodes: usize,
+}
+
+/// What takes a [`Step`] back.
 enum Undo {
     State { index: u32, state: State },
     Root { position: [i32; 3], root: Option<u32> },
@@ -84,22 +101,99 @@ impl LevelCover {
     /// Edits may have made chunks empty, or not empty any more: such leaves are both removed and added. The extent must be
     /// the same.
     pub fn changes_to(&self, target: &Self) -> Option<Vec<LevelChange>> {
+        let (changes, _) = self.first_changes_to(target, usize::MAX, 0, |_| 0)?;
+        Some(changes)
+    }
+
+    /// The first `most` changes of a [way](Self::changes_to) to another cover, and whether they lead all the way there.
+    /// `urgency`: of splitting a chunk, or of putting it together; of the changes that may be made, the one with the
+    /// lowest number comes first.
+    ///
+    /// Changes beside each other become one while it has at most `meshes` leaves to be meshed; so a leaf between them is
+    /// meshed once. With 0, all stay apart. A change that cannot be made in parts may have more.
+    pub fn first_changes_to(
+        &self,
+        target: &Self,
+        most: usize,
+        meshes: usize,
+        mut urgency: impl FnMut(LeafKey) -> u32,
+    ) -> Option<(Vec<LevelChange>, bool)> {
         if self.top != target.top {
             return None;
         }
         let (mut cover, mut changes) = (self.clone(), Vec::new());
         loop {
-            let steps = cover.steps_to(target);
-            if steps.is_empty() {
-                return Some(changes);
+            let mut steps = cover.steps_to(target, None);
+            if steps.is_empty() || changes.len() >= most {
+                return Some((changes, steps.is_empty()));
             }
+            steps.sort_by_cached_key(|step| urgency(step.key()));
             let made = changes.len();
-            changes.extend(steps.into_iter().filter_map(|step| cover.try_steps(&[step])));
+            for step in steps {
+                // An earlier change may have made the step already.
+                if changes.len() < most && cover.lacks(step) {
+                    changes.extend(cover.grow_change(step, target, meshes, &mut urgency));
+                }
+            }
             if changes.len() == made {
                 // Each step alone would leave a cover that does not fit; all of them together do.
                 changes.extend(cover.all_at_once(target));
-                return Some(changes);
+                return Some((changes, true));
             }
+        }
+    }
+
+    /// Makes a step, if the cover then fits, with steps beside it as long as few leaves are to be meshed.
+    fn grow_change(
+        &mut self,
+        step: Step,
+        target: &Self,
+        meshes: usize,
+        urgency: &mut impl FnMut(LeafKey) -> u32,
+    ) -> Option<LevelChange> {
+        let mut made = self.try_steps(&[step])?;
+        let mut tried = vec![step.key()];
+        let mut failures = 0;
+        while failures < MOST_FAILURES && made.change.meshes() < meshes && made.change.steps.len() < MOST_STEPS {
+            let regions = made.change.steps.iter().map(|step| step.key().region());
+            let near = regions.reduce(|a, b| a.union(&b))?;
+            let mut steps = self.steps_to(target, Some(&near));
+            steps.retain(|step| !tried.contains(&step.key()));
+            let Some(next) = steps.into_iter().min_by_key(|step| urgency(step.key())) else { break };
+            tried.push(next.key());
+            let mut steps = made.change.steps.clone();
+            steps.push(next);
+            let former = made.change.clone();
+            self.take_back(made);
+            made = match self.try_steps(&steps) {
+                Some(grown) if grown.change.meshes() <= meshes => grown,
+                other => {
+                    failures += 1;
+                    other.into_iter().for_each(|grown| self.take_back(grown));
+                    let nodes = self.nodes.len();
+                    let undo = former.steps.iter().filter_map(|step| self.make(*step)).collect();
+                    Made { change: former, undo, nodes }
+                }
+            };
+        }
+        Some(made.change)
+    }
+
+    /// Whether a step changes anything.
+    fn lacks(&self, step: Step) -> bool {
+        let state = |key| self.index_over(key).map(|index| self.nodes[index as usize]).filter(|node| node.key == key);
+        match step {
+            Step::AddRoot { key, .. } => !self.roots.contains_key(&key.position),
+            Step::RemoveRoot { key } => self.roots.contains_key(&key.position),
+            Step::Split { key, .. } => state(key).is_some_and(|node| !matches!(node.state, State::Split { .. })),
+            Step::Merge { key, is_empty } => match state(key).map(|node| node.state) {
+                Some(State::Split { first }) => {
+                    (first..first + 8).all(|child| !matches!(self.nodes[child as usize].state, State::Split { .. }))
+                }
+                Some(State::Leaf) => is_empty,
+                Some(State::Empty) => !is_empty,
+                _ => false,
+            },
         }
     }
 
@@ -111,28 +205,37 @@ impl LevelCover {
         self.compact();
     }
 
-    /// The next steps towards another cover, each for itself.
-    fn steps_to(&self, target: &Self) -> Vec<Step> {
+    /// The next steps towards another cover, each for itself; those of chunks that touch a box.
+    fn steps_to(&self, target: &Self, near: Option<&Region>) -> Vec<Step> {
         let mut steps = Vec::new();
-        for (position, &root) in &target.roots {
-            match self.roots.get(position) {
-                Some(&own) => self.steps_below(own, target, root, &mut steps),
-                None => {
-                    let Node { key, state } = target.nodes[root as usize];
-                    steps.push(Step::AddRoot { key, is_empty: matches!(state, State::Empty) });
-                }
+        let mut visit = |position: [i32; 3]| match (self.roots.get(&position), target.roots.get(&position)) {
+            (Some(&own), Some(&other)) => self.steps_below(own, target, other, near, &mut steps),
+            (None, Some(&other)) => {
+                let Node { key, state } = target.nodes[other as usize];
+                steps.push(Step::AddRoot { key, is_empty: matches!(state, State::Empty) });
+            }
+            (Some(&own), None) => steps.push(Step::RemoveRoot { key: self.nodes[own as usize].key }),
+            (None, None) => {}
+        };
+        match near {
+            Some(near) => self.roots_near(near).points().for_each(visit),
+            None => {
+                target.roots.keys().for_each(|position| visit(*position));
+                let leaving = self.roots.keys().filter(|position| !target.roots.contains_key(*position));
+                leaving.for_each(|position| visit(*position));
             }
         }
-        let leaving = self.roots.iter().filter(|(position, _)| !target.roots.contains_key(*position));
-        steps.extend(leaving.map(|(_, &root)| Step::RemoveRoot { key: self.nodes[root as usize].key }));
         steps
     }
 
-    fn steps_below(&self, own: u32, target: &Self, other: u32, steps: &mut Vec<Step>) {
+    fn steps_below(&self, own: u32, target: &Self, other: u32, near: Option<&Region>, steps: &mut Vec<Step>) {
         let (node, wanted) = (self.nodes[own as usize], target.nodes[other as usize]);
+        if near.is_some_and(|near| !touch(&node.key.region(), near)) {
+            return;
+        }
         match (node.state, wanted.state) {
             (State::Split { first }, State::Split { first: other }) => {
-                (0..8).for_each(|child| self.steps_below(first + child, target, other + child, steps));
+                (0..8).for_each(|child| self.steps_below(first + child, target, other + child, near, steps));
             }
             (State::Split { .. }, state) => self.merges_below(own, matches!(state, State::Empty), steps),
             (_, State::Split { first }) => {
@@ -163,41 +266,68 @@ impl LevelCover {
         }
     }
 
-    /// Makes steps, if the cover then fits, and says what they change. Otherwise the cover stays as it is.
-    fn try_steps(&mut self, steps: &[Step]) -> Option<LevelChange> {
+    /// Makes steps, if the cover then fits. Otherwise the cover stays as it is.
+    fn try_steps(&mut self, steps: &[Step]) -> Option<Made> {
         let regions: Vec<Region> = steps.iter().map(|step| step.key().region()).collect();
         let before = self.leaves_touching(&regions);
-        let finer: Vec<FinerNeighbours> = before.iter().map(|(leaf, _)| self.finer_neighbours(*leaf)).collect();
+        let finer_of = |leaf, is_empty| if is_empty { FinerNeighbours::NONE } else { self.finer_neighbours(leaf) };
+        let finer: Vec<FinerNeighbours> = before.iter().map(|&(leaf, is_empty)| finer_of(leaf, is_empty)).collect();
+        let nodes = self.nodes.len();
         let undo: Vec<Undo> = steps.iter().filter_map(|step| self.make(*step)).collect();
         let after = self.leaves_touching(&regions);
-        if !after.iter().all(|&(leaf, is_empty)| is_empty || fits(self, leaf)) {
-            undo.into_iter().rev().for_each(|undo| self.take_back(undo));
-            return None;
-        }
         let mut change = LevelChange { steps: steps.into(), ..LevelChange::default() };
-        for ((leaf, is_empty), finer) in before.iter().zip(finer) {
-            if after.binary_search(&(*leaf, *is_empty)).is_err() {
-                change.removed.push(*leaf);
-            } else if !is_empty && self.finer_neighbours(*leaf) != finer {
-                change.remeshed.push(*leaf);
+        change.added = after.iter().filter(|leaf| before.binary_search(leaf).is_err()).copied().collect();
+        let coarsest = change.added.iter().map(|(leaf, _)| leaf.level).max().unwrap_or(0);
+        let mut fits = true;
+        for (leaf, is_empty) in &after {
+            let old = before.binary_search(&(*leaf, *is_empty)).ok();
+            if !fits || *is_empty {
+                continue;
+            }
+            // What was there before fits all but what is new.
+            if old.is_none() || leaf.level + 1 < coarsest {
+                fits = too_coarse(self, *leaf).is_none();
+            }
+            let now = self.finer_neighbours(*leaf);
+            if old.is_none_or(|old| finer[old] != now) {
+                fits = fits && now.alternating_edge().is_none();
+                change.remeshed.extend(old.map(|_| *leaf));
             }
         }
-        change.added = after.into_iter().filter(|leaf| before.binary_search(leaf).is_err()).collect();
-        Some(change)
+        let gone = before.into_iter().filter(|leaf| after.binary_search(leaf).is_err());
+        change.removed = gone.map(|(leaf, _)| leaf).collect();
+        let made = Made { change, undo, nodes };
+        if fits {
+            return Some(made);
+        }
+        self.take_back(made);
+        None
+    }
+
+    /// Takes the latest steps back.
+    fn take_back(&mut self, made: Made) {
+        for undo in made.undo.into_iter().rev() {
+            match undo {
+                Undo::State { index, state } => self.nodes[index as usize].state = state,
+                Undo::Root { position, root: Some(root) } => _ = self.roots.insert(position, root),
+                Undo::Root { position, root: None } => _ = self.roots.remove(&position),
+            }
+        }
+        self.nodes.truncate(made.nodes);
     }
 
     /// All that is left on the way to another cover, as one change.
     pub(super) fn all_at_once(&mut self, target: &Self) -> Option<LevelChange> {
         let (mut cover, mut steps) = (self.clone(), Vec::new());
         loop {
-            let next = cover.steps_to(target);
+            let next = cover.steps_to(target, None);
             if next.is_empty() {
                 break;
             }
             next.iter().for_each(|step| _ = cover.make(*step));
             steps.extend(next);
         }
-        self.try_steps(&steps)
+        Some(self.try_steps(&steps)?.change)
     }
 
     /// Makes one step, and says how to take it back; `None` if the cover has no such node.
@@ -228,22 +358,18 @@ impl LevelCover {
         Some(Undo::State { index, state: node.state })
     }
 
-    fn take_back(&mut self, undo: Undo) {
-        match undo {
-            Undo::State { index, state } => self.nodes[index as usize].state = state,
-            Undo::Root { position, root: Some(root) } => _ = self.roots.insert(position, root),
-            Undo::Root { position, root: None } => _ = self.roots.remove(&position),
-        }
+    /// The chunks of the coarsest level that a box of chunks overlaps or touches.
+    fn roots_near(&self, chunks: &Region) -> Region {
+        let chunks = chunks.grown(1, 1);
+        Region::new(chunks.min.map(|v| v >> self.top), chunks.max.map(|v| ((v - 1) >> self.top) + 1))
     }
 
     /// The leaves in some regions and those that touch them, in order, and whether each is empty.
     pub(super) fn leaves_touching(&self, regions: &[Region]) -> Vec<(LeafKey, bool)> {
         let mut found = Vec::new();
         for region in regions {
-            let roots = region.grown(1, 1);
-            let roots = Region::new(roots.min.map(|v| v >> self.top), roots.max.map(|v| ((v - 1) >> self.top) + 1));
-            let mut to_visit: Vec<u32> =
-                roots.points().filter_map(|position| self.roots.get(&position).copied()).collect();
+            let roots = self.roots_near(region).points();
+            let mut to_visit: Vec<u32> = roots.filter_map(|position| self.roots.get(&position).copied()).collect();
             while let Some(index) = to_visit.pop() {
                 let node = self.nodes[index as usize];
                 if !touch(&node.key.region(), region) {

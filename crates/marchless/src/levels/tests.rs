@@ -149,6 +149,7 @@ proptest! {
         (levels, falloff) in (1..5u8, 1.75..3.0f64),
         distances in proptest::array::uniform2(0.5..2.5f64),
         dug in prop::option::of((EXTENT.min[0]..EXTENT.max[0], -9..9i32)),
+        meshes in 0..40usize,
     ) {
         // Chunks right of a place are dug away, or filled, between the two covers.
         let is_dug = |key: LeafKey| dug.is_some_and(|(from, _)| key.region().max[0] > from);
@@ -160,7 +161,18 @@ proptest! {
         let settings = settings(levels, falloff);
         let start = LevelCover::new(&see(&from, from_distance), &settings, None, is_empty)?;
         let target = LevelCover::new(&see(&to, to_distance), &settings, None, is_empty_then)?;
-        let changes = start.changes_to(&target).expect("the numbers of levels are the same");
+        let (changes, is_whole) = start.first_changes_to(&target, usize::MAX, meshes, |_| 0).expect("the same levels");
+        prop_assert!(is_whole);
+        // A part of a way leads to where the rest begins.
+        let (first, is_whole) = start.first_changes_to(&target, 5, meshes, |leaf| leaf.level.into()).expect("the same");
+        prop_assert!(first.len() <= 5 || is_whole);
+        let mut half_way = start.clone();
+        first.iter().for_each(|change| half_way.apply(change));
+        check_leaves_of(&half_way, |leaf| !is_dug(leaf))?;
+        let rest = half_way.changes_to(&target).expect("the same");
+        prop_assert_eq!(rest.is_empty(), is_whole);
+        rest.iter().for_each(|change| half_way.apply(change));
+        prop_assert!(half_way.leaves().eq(target.leaves()));
         let (mut now, mut most) = (start.clone(), start.reachable().count());
         let drawn = |cover: &LevelCover| -> BTreeMap<LeafKey, (bool, FinerNeighbours)> {
             cover.leaves().map(|(leaf, is_empty)| (leaf, (is_empty, cover.finer_neighbours(leaf)))).collect()

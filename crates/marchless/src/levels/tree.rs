@@ -32,7 +32,19 @@ impl LevelCover {
     /// The index of the smallest node that holds a chunk.
     pub(super) fn index_over(&self, key: LeafKey) -> Option<u32> {
         let up = self.top.checked_sub(key.level)?;
-        let mut index = *self.roots.get(&key.position.map(|v| v >> up))?;
+        self.index_below(*self.roots.get(&key.position.map(|v| v >> up))?, key)
+    }
+
+    /// A search for chunks near one, which mostly share its root.
+    pub(super) fn near(&self, key: LeafKey) -> Near<'_> {
+        let home = key.position.map(|v| v >> (self.top - key.level));
+        Near { cover: self, home, root: self.roots.get(&home).copied() }
+    }
+
+    /// The index of the smallest node below a root that holds a chunk.
+    fn index_below(&self, root: u32, key: LeafKey) -> Option<u32> {
+        let up = self.top.checked_sub(key.level)?;
+        let mut index = root;
         for step in (0..up).rev() {
             let State::Split { first } = self.nodes[index as usize].state else { break };
             let [x, y, z] = key.position.map(|v| (v >> step & 1) as u32);
@@ -73,5 +85,24 @@ impl LevelCover {
             }
         }
         self.compact_at = 2 * self.nodes.len();
+    }
+}
+
+/// A search for nodes near a chunk.
+pub(super) struct Near<'a> {
+    cover: &'a LevelCover,
+    /// The position of the chunk's root, and its index.
+    home: [i32; 3],
+    root: Option<u32>,
+}
+
+impl Near<'_> {
+    /// The smallest node that holds a chunk, and its index; `None` if it is not in view.
+    pub(super) fn node_over(&self, key: LeafKey) -> Option<(u32, &Node)> {
+        let up = self.cover.top.checked_sub(key.level)?;
+        let root = key.position.map(|v| v >> up);
+        let root = if root == self.home { self.root? } else { *self.cover.roots.get(&root)? };
+        let index = self.cover.index_below(root, key)?;
+        Some((index, &self.cover.nodes[index as usize]))
     }
 }

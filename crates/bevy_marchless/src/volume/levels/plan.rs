@@ -1,13 +1,18 @@
 //! [`Plan`]: the way from the shown cover to the one that viewers ask for, computed in a job.
 
 use core::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 use bevy_platform::collections::HashMap;
-use marchless::{LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelViewer};
+use marchless::{LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelViewer, Region};
 
 use super::Surfaces;
+
+/// The most changes that are planned at once.
+const MOST: usize = 96;
+/// The most meshes of a change, as far as that can be.
+const MESHES: usize = 24;
 
 /// A job that computes a plan.
 pub(crate) struct PlanJob {
@@ -27,26 +32,31 @@ pub(crate) struct Planned {
     pub(super) result: Result<Plan, LevelError>,
 }
 
-/// Changes that lead to another cover. Those that overlap keep their order; of the others, the most urgent comes first.
+/// Changes that lead to another cover. One that overlaps another is made after it; otherwise, the most urgent is made
+/// first.
 #[derive(Default)]
 pub(crate) struct Plan {
     pub(super) target: Option<Arc<LevelCover>>,
     changes: Vec<PlannedChange>,
     /// The changes that may start: urgency and index.
     ready: BinaryHeap<Reverse<(u32, usize)>>,
-    /// The changes that wait for each change under way.
-    after_running: BTreeMap<u64, Vec<usize>>,
+    /// The number of changes that have not started.
     left: usize,
+    /// Whether more changes follow once these are made.
+    is_part: bool,
 }
 
 struct PlannedChange {
     change: Arc<LevelChange>,
     /// Lower comes sooner.
     urgency: u32,
-    /// The number of changes that it waits for.
+    /// The changes under way that it comes after.
+    after: Vec<u64>,
+    /// The number of changes that have to start before.
     waits: usize,
-    /// The changes that wait for it.
+    /// The changes that come after it.
     next: Vec<usize>,
+    has_started: bool,
 }
 
 impl PlanJob {
@@ -61,27 +71,33 @@ impl PlanJob {
         running.iter().for_each(|(_, change)| from.apply(change));
         let target = LevelCover::new(viewers, settings, former.as_deref(), |leaf| surfaces.is_empty(leaf))?;
         // Both have the same number of levels.
-        let changes = from.changes_to(&target).unwrap_or_default();
-        let mut plan = Plan { left: changes.len(), target: Some(Arc::new(target)), ..Plan::default() };
+        let first = from.first_changes_to(&target, MOST, MESHES, |leaf| urgency(viewers, leaf));
+        let (changes, is_whole) = first.unwrap_or_default();
+        let mut plan =
+            Plan { left: changes.len(), is_part: !is_whole, target: Some(Arc::new(target)), ..Plan::default() };
         let mut near = Near::new(settings.levels);
         for (id, change) in running {
             near.add(change, Owner::Running(*id));
         }
         for change in changes {
             let (index, change) = (plan.changes.len(), Arc::new(change));
-            let waits = near.overlapping(&change);
-            for owner in &waits {
+            let (mut after, mut waits) = (Vec::new(), 0);
+            for owner in near.overlapping(&change) {
                 match owner {
-                    Owner::Running(id) => plan.after_running.entry(*id).or_default().push(index),
-                    Owner::Planned(before) => plan.changes[*before].next.push(index),
+                    Owner::Running(id) => after.push(id),
+                    Owner::Planned(before) => {
+                        plan.changes[before].next.push(index);
+                        waits += 1;
+                    }
                 }
             }
-            let urgency = urgency(viewers, &change);
-            if waits.is_empty() {
+            let leaves = change.added.iter().map(|(leaf, _)| *leaf).chain(change.removed.iter().copied());
+            let urgency = leaves.map(|leaf| urgency(viewers, leaf)).min().unwrap_or(0);
+            if waits == 0 {
                 plan.ready.push(Reverse((urgency, index)));
             }
             near.add(&change, Owner::Planned(index));
-            plan.changes.push(PlannedChange { change, urgency, waits: waits.len(), next: Vec::new() });
+            plan.changes.push(PlannedChange { change, urgency, after, waits, next: Vec::new(), has_started: false });
         }
         Ok(plan)
     }
@@ -93,10 +109,19 @@ impl Plan {
         self.left
     }
 
+    /// Whether more changes are to be planned. `is_outdated`: whether viewers have moved.
+    pub(super) const fn is_short(&self, is_outdated: bool) -> bool {
+        (self.is_part || is_outdated) && self.left < MOST / 4
+    }
+
+    /// Whether all changes are planned and have started.
+    pub(super) const fn is_done(&self) -> bool {
+        !self.is_part && self.left == 0
+    }
+
     /// The leaves with a surface that changes still to be started will add.
     pub(super) fn leaves_to_come(&self) -> usize {
-        let started = |change: &PlannedChange| change.waits == usize::MAX;
-        let to_come = self.changes.iter().filter(|change| !started(change));
+        let to_come = self.changes.iter().filter(|planned| !planned.has_started);
         to_come.map(|planned| planned.change.added.iter().filter(|(_, is_empty)| !is_empty).count()).sum()
     }
 
@@ -104,54 +129,43 @@ impl Plan {
         !self.ready.is_empty()
     }
 
-    /// Takes the most urgent change that may start: the change, its urgency, and those that wait for it.
-    pub(super) fn start_next(&mut self) -> Option<(Arc<LevelChange>, u32, Vec<usize>)> {
-        let Reverse((urgency, index)) = self.ready.pop()?;
+    /// Starts the most urgent change that may start, under this number. Returns it, and the changes under way that it
+    /// comes after; some of them may have been shown since.
+    pub(super) fn start_next(&mut self, id: u64) -> Option<(Arc<LevelChange>, Vec<u64>)> {
+        let Reverse((_, index)) = self.ready.pop()?;
         self.left -= 1;
         let planned = &mut self.changes[index];
-        planned.waits = usize::MAX;
-        Some((planned.change.clone(), urgency, core::mem::take(&mut planned.next)))
-    }
-
-    /// The changes that wait for each change that was under way when the plan was made.
-    pub(super) fn take_after_running(&mut self) -> BTreeMap<u64, Vec<usize>> {
-        core::mem::take(&mut self.after_running)
-    }
-
-    /// Notes that a change is shown that others waited for.
-    pub(super) fn shown(&mut self, next: Vec<usize>) {
+        planned.has_started = true;
+        let (change, after, next) =
+            (planned.change.clone(), core::mem::take(&mut planned.after), core::mem::take(&mut planned.next));
         for index in next {
             let planned = &mut self.changes[index];
+            planned.after.push(id);
             planned.waits -= 1;
             if planned.waits == 0 {
                 self.ready.push(Reverse((planned.urgency, index)));
             }
         }
+        Some((change, after))
     }
 }
 
-/// Large chunks that look small from far away come last.
-fn urgency(viewers: &[LevelViewer], change: &LevelChange) -> u32 {
-    let leaves = change.added.iter().map(|(leaf, _)| *leaf).chain(change.removed.iter().copied());
-    let distance = |leaf: LeafKey| {
-        let Region { min, max } = leaf.region();
-        let width = f64::from(1u32 << leaf.level);
-        let of = |viewer: &LevelViewer| {
-            let beyond = |axis: usize| {
-                let place = viewer.position[axis];
-                place - place.clamp(min[axis].into(), max[axis].into())
-            };
-            (0..3).map(|axis| beyond(axis) * beyond(axis)).sum::<f64>()
+/// The urgency of a leaf, lower comes first: near leaves first, and large ones before small ones as near.
+fn urgency(viewers: &[LevelViewer], leaf: LeafKey) -> u32 {
+    let (Region { min, max }, width) = (leaf.region(), f64::from(1u32 << leaf.level));
+    let distance = |viewer: &LevelViewer| {
+        let beyond = |axis: usize| {
+            let place = viewer.position[axis];
+            place - place.clamp(min[axis].into(), max[axis].into())
         };
-        viewers.iter().map(of).fold(f64::INFINITY, f64::min).sqrt() / width
+        (0..3).map(|axis| beyond(axis) * beyond(axis)).sum::<f64>()
     };
-    let nearest = leaves.map(distance).fold(f64::INFINITY, f64::min);
-    (nearest * 64.0) as u32
+    let nearest = viewers.iter().map(distance).fold(f64::INFINITY, f64::min).sqrt();
+    (64.0 * nearest / width) as u32
 }
 
-use marchless::Region;
-
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// A change under way, or one that is planned.
+#[derive(Clone, Copy)]
 enum Owner {
     Running(u64),
     Planned(usize),
@@ -160,7 +174,7 @@ enum Owner {
 /// Changes by the chunks of the coarsest level that they lie in.
 struct Near {
     shift: u8,
-    changes: Vec<(Arc<LevelChange>, Owner)>,
+    changes: Vec<(Arc<LevelChange>, Region, Owner)>,
     cells: HashMap<[i32; 3], Vec<usize>>,
 }
 
@@ -170,27 +184,31 @@ impl Near {
     }
 
     /// The chunks of the coarsest level that a change lies in or touches.
-    fn cells_of(&self, change: &LevelChange) -> Region {
-        let Region { min, max } = change.region();
+    fn cells_of(&self, Region { min, max }: Region) -> Region {
         let end = |v: i32, step: i32| v.saturating_add(step) >> self.shift;
         Region::new(min.map(|v| end(v, -1)), max.map(|v| end(v, 0).saturating_add(1)))
     }
 
     fn add(&mut self, change: &Arc<LevelChange>, owner: Owner) {
-        let index = self.changes.len();
-        self.changes.push((change.clone(), owner));
-        for cell in self.cells_of(change).points() {
+        let (index, region) = (self.changes.len(), change.region());
+        self.changes.push((change.clone(), region, owner));
+        for cell in self.cells_of(region).points() {
             self.cells.entry(cell).or_default().push(index);
         }
     }
 
     /// The changes that one overlaps.
     fn overlapping(&self, change: &LevelChange) -> Vec<Owner> {
-        let near = self.cells_of(change).points().filter_map(|cell| self.cells.get(&cell)).flatten();
-        let mut near: Vec<usize> = near.copied().collect();
+        let region = change.region();
+        let touches = |index: &usize| {
+            let other = self.changes[*index].1;
+            (0..3).all(|axis| region.min[axis] <= other.max[axis] && other.min[axis] <= region.max[axis])
+        };
+        let near = self.cells_of(region).points().filter_map(|cell| self.cells.get(&cell)).flatten();
+        let mut near: Vec<usize> = near.copied().filter(touches).collect();
         near.sort_unstable();
         near.dedup();
         let overlaps = |index: &usize| self.changes[*index].0.overlaps(change);
-        near.into_iter().filter(overlaps).map(|index| self.changes[index].1).collect()
+        near.into_iter().filter(overlaps).map(|index| self.changes[index].2).collect()
     }
 }

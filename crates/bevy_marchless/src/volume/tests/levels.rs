@@ -107,8 +107,13 @@ impl Game {
         for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
             let key = ChunkKey::from(leaf);
             let mut expected = MeshBuffer::new();
-            block.fill(&source, cover, leaf);
-            mesher.mesh_leaf(&block.samples().expect("one answer"), settings, &mut expected).expect("a leaf");
+            if leaf.level == 0 {
+                // Chunks that the source's bound settles are uniform, which shows in normals beside them.
+                fresh.mesh_chunk(leaf.position, &mut mesher, settings, &mut expected).expect("a chunk");
+            } else {
+                block.fill(&source, cover, leaf);
+                mesher.mesh_leaf(&block.samples().expect("one answer"), settings, &mut expected).expect("a leaf");
+            }
             union.add(&expected, leaf.region().min.map(|v| i64::from(v) * i64::from(CELLS)), leaf.level);
             if is_despawned(&key) {
                 continue;
