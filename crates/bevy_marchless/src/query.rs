@@ -1,6 +1,7 @@
 //! [`TerrainQuery`]: ray casts, distances to the surface, and conversions between world and lattice.
 
 mod bounds;
+mod coarser;
 mod transforms;
 mod visibility;
 
@@ -66,6 +67,8 @@ pub struct TerrainHit {
     pub terrain: Entity,
     /// The entity of the chunk whose triangle was hit.
     pub chunk: Entity,
+    /// The chunk's level of detail; 0 is the finest.
+    pub level: u8,
     /// The position of the hit in world space.
     pub position: Vec3,
     /// The triangle's unit normal in world space, pointing outside.
@@ -215,6 +218,16 @@ fn is_unfilled(volume: &TerrainVolume, chunk: [i32; 3]) -> bool {
     !is_there && volume.grid().bounds().is_none_or(|bounds| bounds.contains(chunk))
 }
 
+/// A hit in the terrain's lattice; its distance in voxels.
+struct LatticeHit {
+    chunk: Entity,
+    level: u8,
+    distance: f64,
+    lattice: DVec3,
+    normal: DVec3,
+    material: u8,
+}
+
 /// The first drawn triangle of one terrain that a ray hits.
 fn cast(
     (terrain, volume, place): (Entity, &TerrainVolume, PlacementItem),
@@ -229,26 +242,36 @@ fn cast(
     let scale = step.length();
     let direction = step / scale;
     let reach = f64::from(max_distance) * scale;
+    let finest = cast_finest(volume, origin, direction, reach);
+    let nearer = finest.as_ref().map_or(reach, |hit| hit.distance);
+    let hit = coarser::cast(volume.heart(), origin, direction, nearer).or(finest)?;
+    let normal = to_terrain.matrix3.transpose() * hit.normal;
+    Some(TerrainHit {
+        terrain,
+        chunk: hit.chunk,
+        level: hit.level,
+        position: to_world.transform_point3(hit.lattice * voxel_size).as_vec3(),
+        normal: normal.as_vec3().normalize_or_zero(),
+        lattice: hit.lattice,
+        material: hit.material,
+        distance: (hit.distance / scale) as f32,
+    })
+}
+
+/// The first drawn triangle of the finest level.
+fn cast_finest(volume: &TerrainVolume, origin: DVec3, direction: DVec3, reach: f64) -> Option<LatticeHit> {
+    let (shown, isovalue) = (volume.shown(), volume.shown_isovalue());
     let mut start = 0.0;
     loop {
         let from = origin + direction * start;
-        let (shown, isovalue) = (volume.shown(), volume.shown_isovalue());
         let hit = shown.ray_cast(isovalue, from.to_array(), direction.to_array(), reach - start)?;
         let Some(chunk) = volume.heart().entity(ChunkKey::finest(hit.chunk)) else {
-            // This chunk is not drawn yet; its samples serve its neighbours. Continue behind the hit.
+            // This chunk is not drawn; its samples serve its neighbours. Continue behind the hit.
             start += hit.distance + 1e-3;
             continue;
         };
+        let (distance, normal) = (start + hit.distance, Vec3::from(hit.normal).as_dvec3());
         let lattice = DVec3::from(hit.position);
-        let normal = to_terrain.matrix3.transpose() * Vec3::from(hit.normal).as_dvec3();
-        return Some(TerrainHit {
-            terrain,
-            chunk,
-            position: to_world.transform_point3(lattice * voxel_size).as_vec3(),
-            normal: normal.as_vec3().normalize_or_zero(),
-            lattice,
-            material: hit.material,
-            distance: ((start + hit.distance) / scale) as f32,
-        });
+        return Some(LatticeHit { chunk, level: 0, distance, lattice, normal, material: hit.material });
     }
 }

@@ -156,6 +156,12 @@ impl LevelCover {
         })
     }
 
+    /// The box around all leaves, in chunks of level 0; empty if there are none.
+    pub fn region(&self) -> Region {
+        let roots = self.roots.keys().map(|&position| LeafKey { level: self.top, position }.region());
+        roots.reduce(|a, b| a.union(&b)).unwrap_or(Region::new([0; 3], [0; 3]))
+    }
+
     /// The leaf that holds a chunk of level 0; `None` if it is not in view or does not exist.
     pub fn leaf_at(&self, chunk: [i32; 3]) -> Option<LeafKey> {
         let node = self.node_over(LeafKey { level: 0, position: chunk })?;

@@ -7,7 +7,6 @@ use bevy_reflect::prelude::*;
 use marchless::Grid;
 
 use super::Terrain;
-use crate::chunk::ChunkKey;
 use crate::cover::{Coverage, Leaf};
 use crate::volume::Heart;
 
@@ -68,12 +67,13 @@ impl TerrainVolume {
         self.settings.as_ref()
     }
 
-    /// The entity of the chunk at `position`, in chunks; `None` if there is nothing to draw.
+    /// The entity of the chunk that is drawn at `position`, in chunks of the finest level; `None` if there is nothing to
+    /// draw.
     pub fn chunk_entity(&self, position: IVec3) -> Option<Entity> {
-        self.heart.entity(ChunkKey::finest(position.to_array()))
+        self.heart.entity(self.heart.drawn_leaf_at(position.to_array())?)
     }
 
-    /// The state of the chunk at `position`, in chunks; `None` outside all load regions.
+    /// The leaf that holds `position`, in chunks of the finest level, and its state; `None` outside all load regions.
     ///
     /// All positions in the load regions form the terrain's cover: each belongs to one leaf in every update.
     pub fn leaf_at(&self, position: IVec3) -> Option<Leaf> {

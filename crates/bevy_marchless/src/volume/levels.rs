@@ -55,6 +55,8 @@ pub(super) struct Levels {
     plan: Plan,
     /// The job that computes another plan.
     planning: Option<(u64, Ticket)>,
+    /// The changes that edits have made since that plan was requested.
+    since: Vec<Arc<LevelChange>>,
     planned: Results<Planned>,
     /// The viewers for whom the plan was made.
     planned_for: BTreeMap<ViewId, LevelViewer>,
@@ -142,6 +144,11 @@ fn members(change: &LevelChange) -> impl Iterator<Item = ChunkKey> + '_ {
     added.chain(&change.remeshed).map(|leaf| ChunkKey::from(*leaf))
 }
 
+/// Whether an edit has put a surface into a leaf that a change was to add without one.
+fn has_filled(change: &LevelChange, surfaces: &Surfaces) -> bool {
+    change.added.iter().any(|(leaf, is_empty)| *is_empty && !surfaces.is_empty(*leaf))
+}
+
 /// The new leaves of the finest level that may have a surface.
 fn finest(change: &LevelChange) -> impl Iterator<Item = [i32; 3]> + '_ {
     change.added.iter().filter(|(leaf, is_empty)| leaf.level == 0 && !is_empty).map(|(leaf, _)| leaf.position)
@@ -168,6 +175,7 @@ impl Levels {
             target: None,
             plan: Plan::default(),
             planning: None,
+            since: Vec::new(),
             planned: Results::default(),
             planned_for: BTreeMap::new(),
             is_outdated: false,
@@ -308,18 +316,16 @@ impl Levels {
         all.into_values().collect()
     }
 
-    /// Withdraws a change under way and all that would be shown after it. Returns their new leaves of the finest level.
-    fn withdraw(&mut self, id: u64) -> Vec<[i32; 3]> {
-        let mut gone = BTreeSet::from([id]);
-        for (later, running) in self.running.range(id..) {
-            if running.after.iter().any(|before| gone.contains(before)) {
-                gone.insert(*later);
+    /// Withdraws changes under way and all that would be shown after them.
+    fn withdraw(&mut self, is_out_of_date: impl Fn(&Running) -> bool) -> Vec<Arc<LevelChange>> {
+        let mut gone = BTreeSet::new();
+        for (id, running) in &self.running {
+            let is_gone = is_out_of_date(running) || running.after.iter().any(|before| gone.contains(before));
+            if is_gone && !running.is_urgent {
+                gone.insert(*id);
             }
         }
-        gone.iter()
-            .filter_map(|id| self.running.remove(id))
-            .flat_map(|running| running.finest().collect::<Vec<_>>())
-            .collect()
+        gone.into_iter().filter_map(|id| self.running.remove(&id)).map(|running| running.change).collect()
     }
 
     /// Notes that edits have changed lattice points: meshes that were made before are out of date.
@@ -406,9 +412,8 @@ impl Heart {
     pub(crate) fn start_plan(&mut self, start: impl FnOnce(PlanJob, Results<Planned>) -> Ticket) {
         let Some(levels) = &mut self.levels else { return };
         if core::mem::take(&mut levels.has_jumped) {
-            let waiting = levels.running.iter().filter(|(_, running)| running.meshing.is_none() && !running.is_urgent);
-            let waiting: Vec<u64> = waiting.map(|(id, _)| *id).collect();
-            let left: Vec<_> = waiting.into_iter().flat_map(|id| levels.withdraw(id)).collect();
+            let gone = levels.withdraw(|running| running.meshing.is_none());
+            let left: Vec<_> = gone.iter().flat_map(|change| finest(change)).collect();
             levels.leave_finest(&left, false);
             self.leaving_around(&left);
         }
@@ -423,6 +428,7 @@ impl Heart {
             former: levels.target.clone(),
             surfaces: levels.surfaces.clone(),
         };
+        levels.since.clear();
         levels.is_outdated = false;
         levels.planned_for.clone_from(&levels.viewers);
         // What was planned so far ends here, so that the new plan begins where it did.
@@ -443,6 +449,9 @@ impl Heart {
                     levels.has_too_many = false;
                     levels.target.clone_from(&plan.target);
                     levels.plan = plan;
+                    let Levels { plan, since, surfaces, .. } = levels;
+                    let is_past = |change: &LevelChange| since.iter().any(|made| made.overlaps(change));
+                    plan.withdraw(|change| is_past(change) || has_filled(change, surfaces));
                 }
                 Err(error) => {
                     if !core::mem::replace(&mut levels.has_too_many, true) {
@@ -692,36 +701,28 @@ impl Heart {
             .filter(|(leaf, is_empty)| *is_empty && !surfaces.is_empty(*leaf))
             .map(|(leaf, _)| leaf)
             .collect();
-        // Changes to come may add leaves that were empty when they were planned.
-        levels.plan = Plan::default();
-        (levels.planning, levels.is_outdated, levels.has_jumped) = (None, true, true);
         let viewers = levels.viewers();
         let change = match cover.fill(&filled, &viewers, &levels.settings, |leaf| surfaces.is_empty(leaf)) {
             Ok(change) => Arc::new(change),
             Err(error) => return bevy_log::warn!("an edit in an empty part of a terrain is not shown: {error}"),
         };
-        let is_out_of_date = |running: &Running| {
-            let mut added = running.change.added.iter();
-            added.any(|(leaf, is_empty)| *is_empty && !surfaces.is_empty(*leaf)) || running.change.overlaps(&change)
-        };
-        let overlapping: Vec<u64> =
-            levels.running.iter().filter(|(_, running)| is_out_of_date(running)).map(|(id, _)| *id).collect();
-        let mut after = Vec::new();
-        let mut left = Vec::new();
-        for id in overlapping {
-            if levels.running.get(&id).is_some_and(|running| running.is_urgent) {
-                after.push(id);
-            } else {
-                left.extend(levels.withdraw(id));
-            }
-        }
+        // Changes to come may add leaves that were empty when they were planned.
+        let is_out_of_date = |other: &LevelChange| other.overlaps(&change) || has_filled(other, &surfaces);
+        let gone = levels.withdraw(|running| is_out_of_date(&running.change));
+        let is_behind = |other: &LevelChange| gone.iter().any(|gone| gone.overlaps(other));
+        levels.plan.withdraw(|other| is_out_of_date(other) || is_behind(other));
+        let left: Vec<[i32; 3]> = gone.iter().flat_map(|change| finest(change)).collect();
         let coming: Vec<[i32; 3]> = finest(&change).collect();
+        levels.since.extend(gone);
         levels.leave_finest(&left, false);
         coming.iter().for_each(|position| _ = levels.finest.entry(*position).or_insert(false));
         if !filled.is_empty() {
-            let running = Running { change, after, is_urgent: true, meshing: None };
-            levels.running.insert(new_number(), running);
+            levels.since.push(change.clone());
+            let urgent = levels.running.iter().filter(|(_, running)| running.is_urgent);
+            let after = urgent.filter(|(_, running)| running.change.overlaps(&change)).map(|(id, _)| *id).collect();
+            levels.running.insert(new_number(), Running { change, after, is_urgent: true, meshing: None });
         }
+        levels.is_outdated = true;
         self.leaving_around(&left);
         let near: BTreeSet<ChunkKey> =
             coming.iter().flat_map(|position| ChunkKey::finest(*position).around()).collect();
@@ -763,6 +764,11 @@ impl Heart {
         let under_way = |running: &Running| running.change.added.iter().filter(|(_, is_empty)| !is_empty).count();
         let waiting = levels.plan.leaves_to_come() + levels.running.values().map(under_way).sum::<usize>();
         Coverage { waiting, empty: counts.empty + empty, drawn: counts.drawn }
+    }
+
+    /// A box around all leaves, in chunks of the finest level; `None` if there is one level.
+    pub(crate) fn levels_region(&self) -> Option<Region> {
+        self.levels.as_ref().map(|levels| levels.shown.region())
     }
 
     /// The leaf that is drawn at a chunk of the finest level.

@@ -27,6 +27,7 @@ mod file_text;
 mod fixed_update;
 mod hierarchy;
 mod isovalue;
+mod levels;
 mod many;
 #[cfg(feature = "pbr")]
 mod materials;

@@ -57,6 +57,7 @@ struct PlannedChange {
     /// The changes that come after it.
     next: Vec<usize>,
     has_started: bool,
+    is_withdrawn: bool,
 }
 
 impl PlanJob {
@@ -97,7 +98,9 @@ impl PlanJob {
                 plan.ready.push(Reverse((urgency, index)));
             }
             near.add(&change, Owner::Planned(index));
-            plan.changes.push(PlannedChange { change, urgency, after, waits, next: Vec::new(), has_started: false });
+            let next = Vec::new();
+            let (has_started, is_withdrawn) = (false, false);
+            plan.changes.push(PlannedChange { change, urgency, after, waits, next, has_started, is_withdrawn });
         }
         Ok(plan)
     }
@@ -117,6 +120,24 @@ impl Plan {
     /// Whether all changes are planned and have started.
     pub(super) const fn is_done(&self) -> bool {
         !self.is_part && self.left == 0
+    }
+
+    /// Drops the changes that are not to be made any more, and those that come after them; another plan has to follow.
+    pub(super) fn withdraw(&mut self, is_out_of_date: impl Fn(&LevelChange) -> bool) {
+        // Those that come after a change stand behind it in the list.
+        for index in 0..self.changes.len() {
+            let planned = &mut self.changes[index];
+            if planned.has_started || !(planned.is_withdrawn || is_out_of_date(&planned.change)) {
+                continue;
+            }
+            (planned.has_started, planned.is_withdrawn) = (true, true);
+            (self.left, self.is_part) = (self.left - 1, true);
+            for next in core::mem::take(&mut planned.next) {
+                self.changes[next].is_withdrawn = true;
+            }
+        }
+        let changes = &self.changes;
+        self.ready.retain(|Reverse((_, index))| !changes[*index].has_started);
     }
 
     /// The leaves with a surface that changes still to be started will add.

@@ -81,7 +81,8 @@ impl Source for Hills {
     }
 
     fn bound_closely(&self, region: &SourceRegion) -> Bound {
-        let [low, high] = box_of(region);
+        // Samples of 3 or more voxels, as this bound promises, lie that far from the surface.
+        let [low, high] = box_of(&region.grown(4));
         let [x, z] = [0, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
         // The steepest slopes along x and z.
         let change = 0.5 * ((high[0] - low[0]) * (0.35 + 0.063) + (high[2] - low[2]) * (0.3 + 0.051)) + 0.01;
