@@ -173,9 +173,10 @@ impl LevelCover {
         self.node_over(key).is_some_and(|node| node.key == key && matches!(node.state, State::Split { .. }))
     }
 
-    /// The leaves that a box of chunks of level 0 overlaps or touches, in order, and whether each is empty.
+    /// The leaves that overlap or touch (with a face, an edge or a corner) a box of chunks of level 0, in order, and
+    /// whether each is empty. An empty box touches nothing.
     pub fn leaves_near(&self, chunks: Region) -> Vec<(LeafKey, bool)> {
-        self.leaves_touching(&[chunks])
+        if chunks.is_empty() { Vec::new() } else { self.leaves_touching(&[chunks]) }
     }
 
     /// The change that puts a surface into some of this cover's empty leaves, because of an edit: each becomes a leaf with

@@ -368,8 +368,13 @@ impl LevelCover {
     pub(super) fn leaves_touching(&self, regions: &[Region]) -> Vec<(LeafKey, bool)> {
         let mut found = Vec::new();
         for region in regions {
-            let roots = self.roots_near(region).points();
-            let mut to_visit: Vec<u32> = roots.filter_map(|position| self.roots.get(&position).copied()).collect();
+            let roots = self.roots_near(region);
+            let are_many = roots.size().map(f64::from).iter().product::<f64>() > self.roots.len() as f64;
+            let mut to_visit: Vec<u32> = if are_many {
+                self.roots.values().copied().collect()
+            } else {
+                roots.points().filter_map(|position| self.roots.get(&position).copied()).collect()
+            };
             while let Some(index) = to_visit.pop() {
                 let node = self.nodes[index as usize];
                 if !touch(&node.key.region(), region) {
@@ -390,6 +395,6 @@ impl LevelCover {
 }
 
 /// Whether two boxes have a face, an edge or a corner in common, or overlap.
-fn touch(a: &Region, b: &Region) -> bool {
+pub(super) fn touch(a: &Region, b: &Region) -> bool {
     (0..3).all(|axis| a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis])
 }

@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use super::*;
 
 const EXTENT: Region = Region::new([-40, -24, -33], [48, 17, 40]);
+const EVERYTHING: Region = Region::new([i32::MIN; 3], [i32::MAX; 3]);
 
 /// Rolling ground: chunks well above and below it are empty.
 fn is_empty(key: LeafKey) -> bool {
@@ -92,6 +93,7 @@ proptest! {
         viewers in prop::collection::vec(viewer(), 0..4),
         (levels, falloff, view_distance) in (1..6u8, 1.75..4.0f64, 1.0..40.0f64),
         steps in prop::collection::vec((any::<prop::sample::Index>(), proptest::array::uniform3(-3.0..3.0f64)), 0..4),
+        (low, size) in (proptest::array::uniform3(-50..50i32), proptest::array::uniform3(0..20i32)),
     ) {
         let (settings, mut viewers) = (settings(levels, falloff), viewers);
         let mut calls = BTreeSet::new();
@@ -100,6 +102,13 @@ proptest! {
             is_empty(key)
         })?;
         check(&cover, &viewers, &settings)?;
+        for chunks in [Region::new(low, [0, 1, 2].map(|axis| low[axis] + size[axis])), EVERYTHING] {
+            let mut near: Vec<(LeafKey, bool)> =
+                cover.leaves().filter(|(leaf, _)| super::change::touch(&leaf.region(), &chunks)).collect();
+            near.sort_unstable();
+            near.retain(|_| !chunks.is_empty());
+            prop_assert_eq!(cover.leaves_near(chunks), near);
+        }
         for (which, offset) in steps {
             if let Some(viewer) = viewers.len().checked_sub(1).map(|last| which.index(last + 1)) {
                 viewers[viewer] = [0, 1, 2].map(|axis| viewers[viewer][axis] + offset[axis]);
