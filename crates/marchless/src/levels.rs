@@ -141,9 +141,11 @@ impl LevelCover {
         builder.add_roots(&mut cover)?;
         let roots: Vec<u32> = cover.roots.values().copied().collect();
         for root in roots {
+            builder.mark_empty(&mut cover, root);
             builder.refine(&mut cover, root)?;
         }
-        balance::balance(&mut cover, &mut builder)?;
+        let all = 0..cover.nodes.len() as u32;
+        balance::balance(&mut cover, &mut builder, all)?;
         Ok(cover)
     }
 
@@ -181,7 +183,10 @@ impl LevelCover {
 
     /// The change that puts a surface into some of this cover's empty leaves, because of an edit: each becomes a leaf with
     /// a surface, split as the viewers want it, and others are split until all fit. Keys that are not empty leaves of the
-    /// cover are left out.
+    /// cover are ignored. No leaf is merged, even if a new cover would have a coarser one.
+    ///
+    /// `is_empty`: as for [`LevelCover::new`], after the edit. It is called for parts of leaves only: these leaves
+    /// themselves count as not empty.
     ///
     /// # Errors
     /// As [`LevelCover::new`].
@@ -195,15 +200,19 @@ impl LevelCover {
         settings.check(viewers)?;
         let mut filled = self.clone();
         let mut builder = Builder { viewers, settings, former: Some(self), is_empty: &mut is_empty };
+        let mut touched = Vec::new();
         for leaf in leaves {
             let Some(index) = filled.index_over(*leaf) else { continue };
             let node = &mut filled.nodes[index as usize];
             if node.key == *leaf && matches!(node.state, State::Empty) {
                 node.state = State::Leaf;
                 builder.refine(&mut filled, index)?;
+                touched.push(leaf.region());
             }
         }
-        balance::balance(&mut filled, &mut builder)?;
+        let near = filled.leaves_touching(&touched);
+        let near: Vec<u32> = near.into_iter().filter_map(|(leaf, _)| filled.index_over(leaf)).collect();
+        balance::balance(&mut filled, &mut builder, near.into_iter())?;
         Ok(self.clone().all_at_once(&filled).unwrap_or_default())
     }
 
@@ -302,25 +311,29 @@ impl Builder<'_> {
         self.check_size(cover)
     }
 
-    /// Splits a new leaf, and what comes of it, as far as viewers want it.
+    /// Makes a leaf an empty one if it has no surface.
+    fn mark_empty(&mut self, cover: &mut LevelCover, index: u32) {
+        let node = &mut cover.nodes[index as usize];
+        if matches!(node.state, State::Leaf) && (self.is_empty)(node.key) {
+            node.state = State::Empty;
+        }
+    }
+
+    /// Splits a leaf, and what comes of it, as far as viewers want it, where there is a surface.
     fn refine(&mut self, cover: &mut LevelCover, index: u32) -> Result<(), LevelError> {
         let mut to_refine = alloc::vec![index];
         while let Some(index) = to_refine.pop() {
-            let key = cover.nodes[index as usize].key;
-            if (self.is_empty)(key) {
-                cover.nodes[index as usize].state = State::Empty;
-            } else if self.is_to_split(key) {
+            let node = cover.nodes[index as usize];
+            if matches!(node.state, State::Leaf) && self.is_to_split(node.key) {
                 let first = self.split_node(cover, index)?;
-                to_refine.extend(
-                    (first..first + 8).rev().filter(|&child| matches!(cover.nodes[child as usize].state, State::Leaf)),
-                );
+                to_refine.extend((first..first + 8).rev());
             }
         }
         Ok(())
     }
 
-    /// Splits a leaf and returns the index of its first child. The children's emptiness is not known yet.
-    fn split_node(&self, cover: &mut LevelCover, index: u32) -> Result<u32, LevelError> {
+    /// Splits a leaf and returns the index of its first child.
+    fn split_node(&mut self, cover: &mut LevelCover, index: u32) -> Result<u32, LevelError> {
         let (key, first) = (cover.nodes[index as usize].key, cover.nodes.len() as u32);
         cover.nodes.extend((0..8).map(|octant| {
             let key = key.child(octant);
@@ -328,6 +341,7 @@ impl Builder<'_> {
         }));
         cover.nodes[index as usize].state = State::Split { first };
         self.check_size(cover)?;
+        (first..first + 8).for_each(|child| self.mark_empty(cover, child));
         Ok(first)
     }
 

@@ -5,9 +5,13 @@ use alloc::collections::VecDeque;
 use super::{Builder, LeafKey, LevelCover, LevelError, neighbour, tree::State};
 
 /// Splits leaves until none with a surface touches one more than one level finer that has one, and until finer and
-/// coarser leaves alternate at no edge of a leaf with a surface.
-pub(super) fn balance(cover: &mut LevelCover, builder: &mut Builder<'_>) -> Result<(), LevelError> {
-    let mut to_check: VecDeque<u32> = (0..cover.nodes.len() as u32).collect();
+/// coarser leaves alternate at no edge of a leaf with a surface. `to_check`: the nodes that may not fit yet.
+pub(super) fn balance(
+    cover: &mut LevelCover,
+    builder: &mut Builder<'_>,
+    to_check: impl Iterator<Item = u32>,
+) -> Result<(), LevelError> {
+    let mut to_check: VecDeque<u32> = to_check.collect();
     while let Some(index) = to_check.pop_front() {
         let node = cover.nodes[index as usize];
         if !matches!(node.state, State::Leaf) {
@@ -17,12 +21,6 @@ pub(super) fn balance(cover: &mut LevelCover, builder: &mut Builder<'_>) -> Resu
         let Some(to_split) = to_split else { continue };
         let split = cover.nodes[to_split as usize].key;
         let first = builder.split_node(cover, to_split)?;
-        for child in first..first + 8 {
-            let child_node = &mut cover.nodes[child as usize];
-            if matches!(child_node.state, State::Leaf) && (builder.is_empty)(child_node.key) {
-                child_node.state = State::Empty;
-            }
-        }
         // What touches the split leaf may not fit any more.
         to_check.extend(first..first + 8);
         to_check.push_back(index);

@@ -121,13 +121,18 @@ proptest! {
     /// Edits put surfaces into empty leaves.
     #[test]
     fn filled_leaves_fit(
-        viewers in prop::collection::vec(viewer(), 1..3),
+        [before, viewers] in proptest::array::uniform2(prop::collection::vec(viewer(), 1..3)),
         (levels, falloff, distance) in (1..6u8, 1.75..3.0f64, 1.0..40.0f64),
         which in prop::collection::vec(any::<prop::sample::Index>(), 1..4),
         dug in proptest::array::uniform3(any::<prop::sample::Index>()),
     ) {
-        let (viewers, settings) = (see(&viewers, distance), settings(levels, falloff));
-        let cover = LevelCover::new(&viewers, &settings, None, is_empty)?;
+        let ([before, viewers], settings) = ([before, viewers].map(|at| see(&at, distance)), settings(levels, falloff));
+        // Changes have led to the cover, so that it has nodes that cannot be reached any more.
+        let mut cover = LevelCover::new(&before, &settings, None, is_empty)?;
+        let wanted = LevelCover::new(&viewers, &settings, Some(&cover), is_empty)?;
+        for change in cover.changes_to(&wanted).expect("the numbers of levels are the same") {
+            cover.apply(&change);
+        }
         let empty: Vec<LeafKey> = cover.leaves().filter(|(_, is_empty)| *is_empty).map(|(leaf, _)| leaf).collect();
         prop_assume!(!empty.is_empty());
         let filled: Vec<LeafKey> = which.iter().map(|index| *index.get(&empty)).collect();
@@ -138,7 +143,13 @@ proptest! {
         };
         let chunks: Vec<[i32; 3]> = filled.iter().map(|leaf| chunk_in(*leaf)).collect();
         let is_filled = |key: LeafKey| chunks.iter().any(|chunk| key.region().contains(*chunk));
-        let change = cover.fill(&filled, &viewers, &settings, |key| is_empty(key) && !is_filled(key))?;
+        let is_empty_now = |key| {
+            assert!(!filled.contains(&key), "{key:?} is filled");
+            is_empty(key) && !is_filled(key)
+        };
+        let others: Vec<LeafKey> = cover.leaves().filter(|(_, is_empty)| !is_empty).map(|(leaf, _)| leaf).collect();
+        prop_assert_eq!(cover.fill(&others, &viewers, &settings, is_empty_now)?, LevelChange::default());
+        let change = cover.fill(&filled, &viewers, &settings, is_empty_now)?;
         let mut now = cover.clone();
         now.apply(&change);
         check_leaves_of(&now, |leaf| !is_filled(leaf))?;
@@ -146,9 +157,22 @@ proptest! {
             let leaf = now.leaf_at(*chunk).expect("it is in view");
             prop_assert!(now.leaves().any(|found| found == (leaf, false)));
         }
-        // The viewers ask for the same.
-        let anew = LevelCover::new(&viewers, &settings, None, |key| is_empty(key) && !is_filled(key))?;
-        prop_assert!(anew.leaves().eq(now.leaves()));
+        // Nodes that cannot be reached any more do not matter.
+        prop_assert_eq!(&change, &wanted.fill(&filled, &viewers, &settings, is_empty_now)?);
+        // Detail is at least what was asked for.
+        for (leaf, _) in now.leaves().filter(|(leaf, is_empty)| !is_empty && is_filled(*leaf)) {
+            let limit = settings.falloff * f64::from(1u32 << leaf.level);
+            let is_far = |viewer: &LevelViewer| distance_squared(viewer.position, leaf) >= limit * limit;
+            prop_assert!(leaf.level == 0 || viewers.iter().all(is_far), "{:?} is too coarse", leaf);
+        }
+        // Other leaves are only split, and only next to such that are filled or split.
+        let mut split: Vec<LeafKey> = change.removed.iter().filter(|leaf| !filled.contains(leaf)).copied().collect();
+        prop_assert!(split.iter().all(|leaf| now.is_split(*leaf)));
+        let mut changed: Vec<LeafKey> = filled.clone();
+        while let Some(found) = split.iter().position(|a| changed.iter().any(|b| touch(*a, *b))) {
+            changed.push(split.swap_remove(found));
+        }
+        prop_assert_eq!(split, []);
     }
 
     /// Changes lead from one cover to another, and all covers between fit.
