@@ -285,10 +285,12 @@ impl Builder<'_> {
             self.add_roots_in(region.intersection(&existing), cover, |key| {
                 let was_in_view = self.former.is_some_and(|former| former.roots.contains_key(&key.position));
                 let limit = if was_in_view { reach } else { distance };
-                distance_squared(position, key) < limit * limit
+                let squared = limit * limit;
+                // Where the square overflows, the box alone is exact enough.
+                squared == f64::INFINITY || distance_squared(position, key) < squared
             })?;
         }
-        self.check_size(cover)
+        Ok(())
     }
 
     /// Adds those of the coarsest chunks in a box that are in view.
@@ -306,9 +308,10 @@ impl Builder<'_> {
             if !cover.roots.contains_key(&position) && self.exists(key) && is_in_view(key) {
                 cover.roots.insert(position, cover.nodes.len() as u32);
                 cover.nodes.push(Node { key, state: State::Leaf });
+                self.check_size(cover)?;
             }
         }
-        self.check_size(cover)
+        Ok(())
     }
 
     /// Makes a leaf an empty one if it has no surface.

@@ -349,6 +349,7 @@ fn bad_settings_are_refused() {
         (good, 1e300),
         (good, f64::INFINITY),
         (LevelSettings { levels: 1, ..good }, 200.0),
+        (LevelSettings { levels: 1, ..good }, 100.0),
         (LevelSettings { falloff: 1e9, ..good }, 1e4),
         (LevelSettings { kept: good.extent, ..good }, 1.0),
     ] {
@@ -369,7 +370,9 @@ fn what_is_kept_needs_no_viewer() {
     let nobody = LevelCover::new(&[], &settings, None, is_empty).unwrap();
     assert!(EXTENT.points().all(|chunk| !kept.contains(chunk) || nobody.leaf_at(chunk).is_some()));
     assert!(nobody.leaves().all(|(leaf, _)| leaf.level == 3));
-    // Whoever sees infinitely far sees all that exists.
-    let all = LevelCover::new(&see(&[[2.0; 3]], f64::INFINITY), &settings, None, is_empty).unwrap();
-    assert!(EXTENT.points().all(|chunk| all.leaf_at(chunk).is_some()));
+    // Viewers that see infinitely far see all that exists, wherever they are.
+    for (place, distance) in [(2.0, f64::INFINITY), (2.0, f64::MAX), (1e300, f64::INFINITY), (1e200, 1e201)] {
+        let all = LevelCover::new(&see(&[[place; 3]], distance), &settings, None, is_empty).unwrap();
+        assert!(EXTENT.points().all(|chunk| all.leaf_at(chunk).is_some()));
+    }
 }
