@@ -34,6 +34,11 @@ impl LeafKey {
         Region::new(self.position.map(|v| scaled(i64::from(v))), self.position.map(|v| scaled(i64::from(v) + 1)))
     }
 
+    /// The chunk of one level coarser that holds this one.
+    fn parent(self) -> Self {
+        Self { level: self.level + 1, position: self.position.map(|v| v >> 1) }
+    }
+
     /// The child of one level finer in an octant: bit 0 is its x, bit 1 its y, bit 2 its z.
     fn child(self, octant: u8) -> Self {
         let position = [0, 1, 2].map(|axis| 2 * self.position[axis] + i32::from(octant >> axis & 1));
@@ -181,9 +186,9 @@ impl LevelCover {
         if chunks.is_empty() { Vec::new() } else { self.leaves_touching(&[chunks]) }
     }
 
-    /// The change that puts a surface into some of this cover's empty leaves, because of an edit: each becomes a leaf with
-    /// a surface, split as the viewers want it, and others are split until all fit. Keys that are not empty leaves of the
-    /// cover are ignored. No leaf is merged, even if a new cover would have a coarser one.
+    /// The change that puts a surface into some of this cover's empty leaves, because of an edit: each becomes a leaf
+    /// with a surface, split as the viewers want it, and others are split until all fit. Keys that are not empty leaves
+    /// of the cover are ignored. No leaf is merged, even if a new cover would have a coarser one.
     ///
     /// `is_empty`: as for [`LevelCover::new`], after the edit. It is called for parts of leaves only: these leaves
     /// themselves count as not empty.
@@ -200,20 +205,21 @@ impl LevelCover {
         settings.check(viewers)?;
         let mut filled = self.clone();
         let mut builder = Builder { viewers, settings, former: Some(self), is_empty: &mut is_empty };
-        let mut touched = Vec::new();
-        for leaf in leaves {
-            let Some(index) = filled.index_over(*leaf) else { continue };
+        let mut changed = Vec::new();
+        for &leaf in leaves {
+            let Some(index) = filled.index_over(leaf) else { continue };
             let node = &mut filled.nodes[index as usize];
-            if node.key == *leaf && matches!(node.state, State::Empty) {
+            if node.key == leaf && matches!(node.state, State::Empty) {
                 node.state = State::Leaf;
                 builder.refine(&mut filled, index)?;
-                touched.push(leaf.region());
+                changed.push(leaf);
             }
         }
-        let near = filled.leaves_touching(&touched);
+        let regions: Vec<Region> = changed.iter().map(|leaf| leaf.region()).collect();
+        let near = filled.leaves_touching(&regions);
         let near: Vec<u32> = near.into_iter().filter_map(|(leaf, _)| filled.index_over(leaf)).collect();
         balance::balance(&mut filled, &mut builder, near.into_iter())?;
-        Ok(self.clone().all_at_once(&filled).unwrap_or_default())
+        Ok(self.refined_to(&filled, &changed).unwrap_or_default())
     }
 
     /// The neighbours of a leaf that are one level finer.

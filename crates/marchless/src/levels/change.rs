@@ -238,20 +238,21 @@ impl LevelCover {
                 (0..8).for_each(|child| self.steps_below(first + child, target, other + child, near, steps));
             }
             (State::Split { .. }, state) => self.merges_below(own, matches!(state, State::Empty), steps),
-            (_, State::Split { first }) => {
-                let bits = |is: fn(State) -> bool| {
-                    (0..8)
-                        .filter(|&child| is(target.nodes[(first + child) as usize].state))
-                        .map(|child| 1u8 << child)
-                        .sum()
-                };
-                let exist = bits(|state| !matches!(state, State::Nowhere));
-                steps.push(Step::Split { key: node.key, exist, empty: bits(|state| matches!(state, State::Empty)) });
-            }
+            (_, State::Split { first }) => steps.push(target.split_step(first as usize)),
             (State::Leaf, State::Empty) => steps.push(Step::Merge { key: node.key, is_empty: true }),
             (State::Empty, State::Leaf) => steps.push(Step::Merge { key: node.key, is_empty: false }),
             _ => {}
         }
+    }
+
+    /// The step that makes eight children, of which the first has this index.
+    fn split_step(&self, first: usize) -> Step {
+        let children = &self.nodes[first..first + 8];
+        let bits =
+            |is: fn(State) -> bool| (0..8).filter(|&child| is(children[child].state)).map(|child| 1 << child).sum();
+        let exist = bits(|state| !matches!(state, State::Nowhere));
+        let empty = bits(|state| matches!(state, State::Empty));
+        Step::Split { key: children[0].key.parent(), exist, empty }
     }
 
     /// The deepest merges that a merge of this node waits for.
@@ -314,6 +315,15 @@ impl LevelCover {
             }
         }
         self.nodes.truncate(made.nodes);
+    }
+
+    /// The change to a refined copy of this cover: some empty leaves have got a surface, and then leaves were split,
+    /// one by one.
+    pub(super) fn refined_to(&self, refined: &Self, filled: &[LeafKey]) -> Option<LevelChange> {
+        let whole = filled.iter().filter(|leaf| !refined.is_split(**leaf));
+        let merges = whole.map(|&key| Step::Merge { key, is_empty: false });
+        let splits = (self.nodes.len()..refined.nodes.len()).step_by(8).map(|first| refined.split_step(first));
+        self.clone().try_steps(&merges.chain(splits).collect::<Vec<_>>())
     }
 
     /// All that is left on the way to another cover, as one change.

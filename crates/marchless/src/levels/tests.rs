@@ -304,10 +304,7 @@ fn two_viewers_make_diagonal_leaves_split_further() {
                 distance_squared(*v, key) < limit * limit
             })
         };
-        let parents = drawn
-            .iter()
-            .filter(|leaf| leaf.level < 2)
-            .map(|leaf| LeafKey { level: leaf.level + 1, position: leaf.position.map(|v| v >> 1) });
+        let parents = drawn.iter().filter(|leaf| leaf.level < 2).map(|leaf| leaf.parent());
         splits += parents.collect::<BTreeSet<_>>().into_iter().filter(|&parent| !wanted(parent)).count();
     }
     assert!(splits > 0, "some edge alternates without further splits");
