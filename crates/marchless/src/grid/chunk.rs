@@ -142,6 +142,17 @@ impl<W: Weight> GridChunk<W> {
         position.map(|v| v.div_euclid(BOUND_BOX_CHUNKS))
     }
 
+    /// Steps 1 to 3 of [`GridChunk::from_source`]: its result if a bound decides it. Takes the same arguments.
+    pub(crate) fn from_bounds(
+        source: &(impl Source + ?Sized),
+        position: [i32; 3],
+        cells: u32,
+        spacing: f64,
+    ) -> Option<Self> {
+        Self::without_sampling(source, position, cells, spacing)
+            .or_else(|| Self::from_bound(source.bound_closely(&source_region(position, 1, cells, spacing))))
+    }
+
     fn from_bound(bound: Bound) -> Option<Self> {
         match bound {
             Bound::Inside { material } => Some(Self::Uniform(Voxel::new(W::INSIDE, material))),

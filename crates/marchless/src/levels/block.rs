@@ -1,13 +1,13 @@
 //! [`LeafBlock`]: the samples of a leaf and of its finer neighbours' faces, filled from a source.
 
-use alloc::{vec, vec::Vec};
+use alloc::{collections::BTreeMap, vec, vec::Vec};
 use core::ops::Range;
 
 use super::{LeafKey, LevelCover};
 use crate::{
     brush::QuantisedStamp,
     cell::Face,
-    grid::{Grid, GridChunk, border::Border},
+    grid::{Grid, GridChunk, MIN_CHUNK_CELLS, border::Border},
     lattice::{MAX_CHUNK_CELLS, Region, Samples, Shape},
     mesher::{FinerNeighbours, LeafError, LeafSamples},
     sample::{Voxel, Weight},
@@ -23,10 +23,13 @@ pub struct LevelSource<'a> {
     pub cells: u32,
     /// World units between neighbouring lattice points of level 0.
     pub spacing: f64,
-    /// What has been edited, in order. Stamps far from a leaf do not matter to it, so they may be left out.
+    /// What has been edited, in order. Stamps whose regions are four lattice points of a leaf's level or more away from
+    /// it do not matter to it, so they may be left out.
     pub stamps: &'a [QuantisedStamp],
-    /// Chunks of level 0 whose samples are known, with everything that has been edited: they count instead of the
-    /// stamps there. A chunk with very many edits is better given by its samples.
+    /// Chunks of level 0 whose samples are known, with everything that has been edited and not clipped to `planes`. They
+    /// count instead of the stamps there, with the same effect: at other levels, only points that differ from
+    /// [`GridChunk::from_source`] have the known sample. A chunk with very many edits is better given by its samples.
+    /// The grid's bounds do not matter. It is ignored if its chunks do not have `cells` cells per axis.
     pub known: Option<&'a Grid<i16>>,
     /// The border of a bounded volume, if it has one: its outermost planes of lattice points, in voxels of level 0, as
     /// [`Grid::planes`](crate::Grid::planes) gives them. What lies beyond is air, and surfaces are closed half a voxel
@@ -53,12 +56,8 @@ impl LevelSource<'_> {
         let end = |axis: usize| i64::from(region.min[axis]) + i64::from(region.size[axis]);
         let points = Region::new(region.min.map(|v| scaled(v.into())), [0, 1, 2].map(|axis| scaled(end(axis))));
         let reaches = |edited: Region| !edited.intersection(&points).is_empty();
-        let is_known = |known: &Grid<i16>| {
-            let chunk = |v: i32| v.div_euclid(known.chunk_cells() as i32);
-            let chunks = Region::new(points.min.map(chunk), points.max.map(|v| chunk(v.saturating_sub(1)) + 1));
-            known.chunks_in(chunks).next().is_some()
-        };
-        if self.stamps.iter().any(|stamp| reaches(stamp.region())) || self.known.is_some_and(is_known) {
+        let mut known = self.known_in(points);
+        if self.stamps.iter().any(|stamp| reaches(stamp.region())) || known.next().is_some() {
             return false;
         }
         match self.source.bound(&region) {
@@ -74,6 +73,20 @@ impl LevelSource<'_> {
     fn cells(&self) -> u32 {
         self.cells.clamp(2, MAX_CHUNK_CELLS)
     }
+
+    /// The known chunks.
+    fn known(&self) -> Option<&Grid<i16>> {
+        self.known.filter(|known| known.chunk_cells() == self.cells())
+    }
+
+    /// The known chunks that have any of these lattice points of level 0: the points of each.
+    fn known_in(&self, points: Region) -> impl Iterator<Item = Region> + '_ {
+        self.known().into_iter().flat_map(move |known| {
+            let last = known.chunk_of(points.max.map(|v| v.saturating_sub(1)));
+            let chunks = Region::new(known.chunk_of(points.min), last.map(|v| v + 1));
+            known.chunks_in(chunks).map(|(position, _)| known.chunk_region(position))
+        })
+    }
 }
 
 /// The samples that the mesh of a leaf is made from. The caller keeps and reuses a block.
@@ -81,7 +94,8 @@ impl LevelSource<'_> {
 /// Samples of all levels are in voxels of level 0: at level `k`, they are the source's answers times 2ᵏ. A lattice point
 /// has one sample, that of the finest leaf that touches it, in the blocks of all leaves. So the meshes of all leaves of a
 /// cover fit, even if the source answers differently at different levels. A point that stamps change has the sample of
-/// level 0 at every level: the source's answer there, with all stamps applied.
+/// level 0 at every level: that of [`GridChunk::from_source`], with all stamps applied. So leaves of level 0 may as
+/// well be meshed as chunks of a [`Grid`].
 ///
 /// ```
 /// use marchless::{
@@ -129,19 +143,24 @@ pub struct LeafBlock {
     finer: FinerNeighbours,
     /// Scratch memory: what a source answers.
     distances: Vec<f32>,
+    /// Scratch memory: the sample of all points of a chunk of level 0, if a bound decides it.
+    bounds: BTreeMap<[i32; 3], Option<Voxel<i16>>>,
 }
 
 impl LeafBlock {
     /// A block of a single sample of air, until [`LeafBlock::fill`] fills it.
     pub fn new() -> Self {
         let faces = core::array::from_fn(|_| SampleBox::new());
-        Self { own: SampleBox::new(), faces, finer: FinerNeighbours::NONE, distances: Vec::new() }
+        let (distances, bounds) = (Vec::new(), BTreeMap::new());
+        Self { own: SampleBox::new(), faces, finer: FinerNeighbours::NONE, distances, bounds }
     }
 
     /// Fills the block for a leaf of a cover. Allocates little once the block has been filled before.
     pub fn fill(&mut self, from: &LevelSource<'_>, cover: &LevelCover, leaf: LeafKey) {
         let cells = from.cells();
-        let mut filler = Filler { from, cover, cells: cells as i32, distances: &mut self.distances };
+        self.bounds.clear();
+        let (distances, bounds) = (&mut self.distances, &mut self.bounds);
+        let mut filler = Filler { from, cover, cells: cells as i32, distances, bounds };
         self.finer = cover.finer_neighbours(leaf);
         let corner = leaf.position.map(|v| v.saturating_mul(cells as i32));
         filler.fill(leaf.level, corner.map(|v| v.saturating_sub(1)), [cells + 3; 3], &mut self.own);
@@ -206,6 +225,7 @@ struct Filler<'a> {
     cover: &'a LevelCover,
     cells: i32,
     distances: &'a mut Vec<f32>,
+    bounds: &'a mut BTreeMap<[i32; 3], Option<Voxel<i16>>>,
 }
 
 impl Filler<'_> {
@@ -263,13 +283,21 @@ impl Filler<'_> {
     }
 
     /// Applies what has been edited to a box of the source's samples.
-    fn apply_edits(&self, region: &SourceRegion, out: &mut SampleBox) {
-        let stamps: Vec<(Region, &QuantisedStamp)> = self.from.stamps.iter().map(|s| (s.region(), s)).collect();
-        let known = self.known_chunks(region);
-        let reaches = stamps.iter().map(|(reach, _)| *reach).enumerate();
+    fn apply_edits(&mut self, region: &SourceRegion, out: &mut SampleBox) {
+        let from = self.from;
+        let stamps: Vec<(Region, &QuantisedStamp)> = from.stamps.iter().map(|s| (s.region(), s)).collect();
+        let scaled = |axis: usize, point: u32| {
+            let point = (i64::from(region.min[axis]) + i64::from(point)) << region.level;
+            point.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+        };
+        let ends = Region::new([0, 1, 2].map(|k| scaled(k, 0)), [0, 1, 2].map(|k| scaled(k, region.size[k])));
+        // At level 0, meshes and normals next to edits read what a bound has decided, too: see `finest`.
+        let beside = if region.level == 0 { 2 } else { 0 };
         // Known chunks come behind all stamps.
-        let mut touched: Vec<TouchedRow> = reaches
-            .chain(known.iter().map(|(reach, _)| (usize::MAX, *reach)))
+        let known = from.known_in(ends.grown(beside, beside)).map(|reach| (usize::MAX, reach));
+        let mut touched: Vec<TouchedRow> = (stamps.iter().map(|(reach, _)| *reach).enumerate().chain(known))
+            .filter(|(_, reach)| !reach.is_empty())
+            .map(|(edit, reach)| (edit, reach.grown(beside, beside)))
             .flat_map(|(edit, reach)| touched_rows(region, reach).map(move |(row, x)| TouchedRow { row, x, edit }))
             .collect();
         touched.sort_unstable_by_key(|touched| (touched.row, touched.edit));
@@ -280,48 +308,45 @@ impl Filler<'_> {
                 let index = out.index([x, y, z]);
                 let (point, step) = ([x, y, z], 1 << region.level);
                 let at = [0, 1, 2].map(|k| region.min[k].saturating_add(point[k] as i32).saturating_mul(step));
-                let old = match region.level {
-                    0 => Voxel::new(out.weights[index], out.materials[index]),
-                    _ => self.finest(at),
-                };
-                let new = match known.iter().find(|(reach, _)| reach.contains(at)) {
-                    Some((reach, chunk)) => chunk.voxel(self.index_in(*reach, at)),
+                let sampled = (region.level == 0).then(|| Voxel::new(out.weights[index], out.materials[index]));
+                let old = self.finest(at, sampled);
+                let new = match self.known(at) {
+                    Some(known) => known,
                     None => {
                         let here = row.iter().filter_map(|touched| stamps.get(touched.edit));
                         here.filter(|(reach, _)| reach.contains(at))
                             .fold(old, |old, (_, stamp)| stamp.at_point(old, at))
                     }
                 };
-                if new != old {
+                if new != old || region.level == 0 {
                     (out.weights[index], out.materials[index]) = (new.weight, new.material);
                 }
             }
         }
     }
 
-    /// The known chunks in a box of lattice points, each with its points.
-    fn known_chunks(&self, region: &SourceRegion) -> Vec<(Region, &GridChunk<i16>)> {
-        let Some(known) = self.from.known.filter(|known| known.chunk_cells() as i32 == self.cells) else {
-            return Vec::new();
-        };
-        let chunk = |axis: usize, point: u32| {
-            let point = (i64::from(region.min[axis]) + i64::from(point)) << region.level;
-            point.div_euclid(self.cells.into()).clamp(i32::MIN.into(), i64::from(i32::MAX) - 1) as i32
-        };
-        let last = |axis: usize| chunk(axis, region.size[axis].saturating_sub(1)) + 1;
-        let chunks = Region::new([0, 1, 2].map(|axis| chunk(axis, 0)), [0, 1, 2].map(last));
-        known.chunks_in(chunks).map(|(position, chunk)| (known.chunk_region(position), chunk)).collect()
+    /// The sample of level 0 at a lattice point in a known chunk.
+    fn known(&self, point: [i32; 3]) -> Option<Voxel<i16>> {
+        let known = self.from.known()?;
+        Some(known.chunk(known.chunk_of(point))?.voxel(known.index(point)))
     }
 
-    /// The index of a lattice point's sample in the chunk that has these points.
-    const fn index_in(&self, chunk: Region, at: [i32; 3]) -> usize {
-        let n = self.cells as usize;
-        let [x, y, z] = [at[0] - chunk.min[0], at[1] - chunk.min[1], at[2] - chunk.min[2]];
-        x as usize + n * (y as usize + n * z as usize)
-    }
-
-    /// The source's sample of level 0 at one lattice point.
-    fn finest(&self, point: [i32; 3]) -> Voxel<i16> {
+    /// The sample of level 0 at one lattice point before all edits, as [`GridChunk::from_source`] has it. `sampled`:
+    /// the source's own answer, if it is there already.
+    ///
+    /// The two differ far from the source's surface, where a bound decides what a whole chunk is made of. Edits may put
+    /// a surface there, and that of a grid's chunk next to it must fit.
+    fn finest(&mut self, point: [i32; 3], sampled: Option<Voxel<i16>>) -> Voxel<i16> {
+        let LevelSource { source, spacing, .. } = *self.from;
+        let (chunk, cells) = (point.map(|v| v.div_euclid(self.cells)), self.cells as u32);
+        let decided = self.bounds.entry(chunk).or_insert_with(|| {
+            // No grid has smaller chunks.
+            let chunk = (cells >= MIN_CHUNK_CELLS).then(|| GridChunk::from_bounds(source, chunk, cells, spacing))??;
+            Some(chunk.voxel(0))
+        });
+        if let Some(known) = decided.or(sampled) {
+            return known;
+        }
         let region = SourceRegion { min: point, size: [1; 3], level: 0, spacing: self.from.spacing };
         let (mut distance, mut material) = ([0.0], [0]);
         self.from.source.fill(&region, &mut distance, &mut material);
@@ -376,7 +401,7 @@ impl Filler<'_> {
 struct TouchedRow {
     row: [u32; 2],
     x: Range<u32>,
-    /// The index of the stamp.
+    /// The index of the stamp; the highest for a known chunk.
     edit: usize,
 }
 
@@ -403,75 +428,4 @@ struct Segment {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{LevelSettings, LevelViewer, Operation, QuantisedShape};
-
-    /// A point that stamps change has the sample of level 0 at every level, and any other the source's own.
-    #[test]
-    fn stamps_reach_every_level() {
-        let source = |[x, y, z]: [f64; 3]| y - 3.0 * libm::sin(x / 9.0) - 2.0 * libm::cos(z / 7.0);
-        let ball = |center, radius| QuantisedShape::sphere(center, radius).unwrap();
-        let stamps = [
-            QuantisedStamp::new(ball([5.0, 1.0, -7.0], 9.0), Operation::Dig, 0),
-            QuantisedStamp::new(ball([9.5, -2.0, -2.0], 5.0), Operation::Add, 3),
-            QuantisedStamp::new(ball([-20.0, 14.0, 20.0], 6.0), Operation::Add, 4),
-            QuantisedStamp::new(ball([8.0, 0.0, -4.0], 7.0), Operation::Paint, 5),
-            QuantisedStamp::new(ball([-58.0, 0.0, -57.0], 6.0), Operation::Dig, 0),
-            QuantisedStamp::new(ball([45.0, 0.0, 48.0], 12.0), Operation::Dig, 0),
-        ];
-        let (cells, extent) = (8, Region::new([-8; 3], [8; 3]));
-        let mut plain = Grid::<i16>::bounded(cells, extent).unwrap();
-        for position in extent.points() {
-            plain.insert(position, GridChunk::from_source(&source, position, cells, 1.0)).unwrap();
-        }
-        let mut edited = plain.clone();
-        stamps.iter().for_each(|stamp| _ = edited.apply(stamp));
-
-        let from = LevelSource {
-            source: &source,
-            cells,
-            spacing: 1.0,
-            stamps: &stamps,
-            known: None,
-            planes: None,
-            isovalue: 0.0,
-        };
-        // Some chunks are given by their samples, and the stamps are wrong there.
-        let mut known = Grid::<i16>::new(cells).unwrap();
-        for (position, chunk) in edited.chunks_in(extent).filter(|([x, _, z], _)| (x + z) % 2 == 0) {
-            known.insert(position, chunk.clone()).unwrap();
-        }
-        let half_known = LevelSource { known: Some(&known), ..from };
-        let settings = LevelSettings { levels: 3, falloff: 1.75, extent, ..LevelSettings::default() };
-        let viewer = LevelViewer { position: [-7.5, 0.0, -7.5], distance: 30.0 };
-        let cover = LevelCover::new(&[viewer], &settings, None, |_| false).unwrap();
-        let (mut block, mut changed) = (LeafBlock::new(), [0; 3]);
-        for (leaf, _) in cover.leaves() {
-            block.fill(&half_known, &cover, leaf);
-            let (own, faces) = (block.own.clone(), block.faces.clone());
-            block.fill(&from, &cover, leaf);
-            let are_same = |a: &SampleBox, b: &SampleBox| a.weights == b.weights && a.materials == b.materials;
-            assert!(are_same(&own, &block.own) && faces.iter().zip(&block.faces).all(|(a, b)| are_same(a, b)));
-            let corner = leaf.position.map(|v| v * cells as i32 - 1);
-            for (index, at) in Region::new([0; 3], [cells as i32 + 3; 3]).points().enumerate() {
-                let point = [0, 1, 2].map(|axis| (corner[axis] + at[axis]) << leaf.level);
-                let (before, after) = (plain.get(point), edited.get(point));
-                let found = Voxel::new(block.own.weights[index], block.own.materials[index]);
-                let limits = Region::new([-64; 3], [64; 3]);
-                if limits.contains(point) {
-                    // A closure answers alike at all levels.
-                    assert_eq!(found, after, "{point:?} of {leaf:?}, {before:?} before");
-                    changed[usize::from(leaf.level)] += usize::from(before != after);
-                }
-            }
-            let is_stamped = stamps.iter().any(|stamp| {
-                let cell = |v: [i32; 3]| v.map(|v| v * cells as i32);
-                let Region { min, max } = leaf.region();
-                !stamp.region().intersection(&Region::new(cell(min), cell(max))).is_empty()
-            });
-            assert!(!(is_stamped && from.is_empty(leaf)));
-        }
-        assert!(changed.iter().all(|&points| points > 0), "{changed:?}");
-    }
-}
+mod tests;

@@ -346,7 +346,7 @@ fn bad_settings_are_refused() {
         (good, 1e300),
         (good, f64::INFINITY),
         (LevelSettings { levels: 1, ..good }, 200.0),
-        (LevelSettings { levels: 1, ..good }, 100.0),
+        (LevelSettings { levels: 1, ..good }, 90.0),
         (LevelSettings { falloff: 1e9, ..good }, 1e4),
         (LevelSettings { kept: good.extent, ..good }, 1.0),
     ] {

@@ -1,9 +1,11 @@
 //! Blocks of leaves filled from a source.
 
+use std::time::Duration;
+
 use fastrand::Rng;
 use marchless::{
     Bound, Grid, GridChunk, LeafBlock, LevelCover, LevelSettings, LevelSource, LevelViewer, MeshBuffer, MeshSettings,
-    MeshUnion, Mesher, Operation, QuantisedShape, QuantisedStamp, Region, Source, SourceRegion,
+    MeshUnion, Mesher, Operation, QuantisedShape, QuantisedStamp, QuantisedStroke, Region, Source, SourceRegion,
 };
 
 use crate::support::random;
@@ -106,6 +108,74 @@ fn whole_covers_are_closed() {
         let union = union(&source, &cover, &MeshSettings { isovalue, ..MeshSettings::default() });
         let report = union.report();
         assert!(report.triangles > 500 && report.is_closed() && report.is_clean(), "round {round}: {report}");
+    }
+}
+
+/// Leaves of level 0 are chunks of a grid, coarser ones are filled from a source, and edits reach far from its surface,
+/// where a bound decides what chunks are made of.
+#[test]
+fn edits_far_from_the_surface_are_closed() {
+    let mut random = Rng::with_seed(5);
+    for round in 0..12 {
+        let (cells, size) = (8, 8);
+        let bumps = Bumps { middle: [3.0, -2.0, 7.0], radius: if round % 2 == 0 { 70.0 } else { 9.0 } };
+        let place = |random: &mut Rng| [(); 3].map(|()| (random.f64() - 0.5) * 80.0);
+        let stamps: Vec<QuantisedStamp> = (0..8)
+            .map(|number| {
+                let center = place(&mut random);
+                let end = [0, 1, 2].map(|axis| center[axis] + 20.0 * (random.f64() - 0.5));
+                let shape = QuantisedShape::capsule(center, end, 2.0 + 6.0 * random.f64()).expect("it is finite");
+                let operation = [Operation::Dig, Operation::Add][(round + usize::from(random.u8(..8) == 0)) % 2];
+                let stroke =
+                    QuantisedStroke::new(number, 40.0, 2.0 * random.f64(), Duration::ZERO, Duration::from_secs(9));
+                let stamp = QuantisedStamp::new(shape, operation, random.u8(5..9));
+                if random.bool() { stamp.with_stroke(stroke.expect("it is finite")) } else { stamp }
+            })
+            .collect();
+        let chunks = Region::new([-size; 3], [size; 3]);
+        let mut grid = Grid::<i16>::new(cells).expect("the grid is small");
+        for position in chunks.points() {
+            grid.insert(position, GridChunk::from_source(&bumps, position, cells, 1.0))
+                .expect("it is within the bounds");
+        }
+        let base = grid.clone();
+        stamps.iter().for_each(|stamp| _ = grid.apply(stamp));
+        // Some edited chunks are given by their samples.
+        let mut known = Grid::<i16>::new(cells).expect("the grid is small");
+        for (position, chunk) in grid.chunks() {
+            if base.chunk(position) != Some(chunk) && random.bool() {
+                known.insert(position, chunk.clone()).expect("it is within the bounds");
+            }
+        }
+        let source = LevelSource {
+            source: &bumps,
+            cells,
+            spacing: 1.0,
+            stamps: &stamps,
+            known: (round % 4 < 2).then_some(&known),
+            planes: None,
+            isovalue: 0.0,
+        };
+        let settings = LevelSettings { levels: 3, falloff: 1.75, ..LevelSettings::default() };
+        let viewer = LevelViewer { position: place(&mut random).map(|v| v / 16.0), distance: 30.0 };
+        let cover = LevelCover::new(&[viewer], &settings, None, |leaf| source.is_empty(leaf)).expect("it is small");
+        let (mut mesher, mut block, mut mesh) = (Mesher::new(), LeafBlock::new(), MeshBuffer::new());
+        let (mut union, mut drawn) = (MeshUnion::new(), [0; 3]);
+        for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
+            if leaf.level == 0 {
+                assert!(chunks.contains(leaf.position));
+                grid.mesh_chunk(leaf.position, &mut mesher, &MeshSettings::default(), &mut mesh).expect("it is sound");
+            } else {
+                block.fill(&source, &cover, leaf);
+                let samples = block.samples().expect("a source has one answer for a point");
+                mesher.mesh_leaf(&samples, &MeshSettings::default(), &mut mesh).expect("it is sound");
+            }
+            union.add(&mesh, leaf.region().min.map(|v| i64::from(v) * i64::from(cells)), leaf.level);
+            drawn[usize::from(leaf.level)] += usize::from(!mesh.is_empty());
+        }
+        let report = union.report();
+        assert!(report.is_closed() && report.is_clean(), "round {round}: {report}");
+        assert!(drawn[..2].iter().all(|&leaves| leaves > 0), "round {round}: {drawn:?}");
     }
 }
 
