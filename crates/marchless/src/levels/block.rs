@@ -43,6 +43,9 @@ impl LevelSource<'_> {
     /// True if a leaf is certain to have no surface: [`Source::bound`] says so of the leaf and of four lattice points of
     /// its level around it, neither a stamp nor a known chunk reaches these points, and no border cuts solid ground
     /// there. It suits [`LevelCover::new`].
+    ///
+    /// The bound is asked at the leaf's level and at all finer ones, since finer leaves beside it share their samples
+    /// with it.
     pub fn is_empty(&self, leaf: LeafKey) -> bool {
         let cells = self.cells();
         let region = SourceRegion {
@@ -60,11 +63,19 @@ impl LevelSource<'_> {
         if self.stamps.iter().any(|stamp| reaches(stamp.region())) || known.next().is_some() {
             return false;
         }
+        let at = |level: u8| {
+            let finer = leaf.level - level;
+            let size = |size: u32| ((size - 1) << finer) + 1;
+            let min = region.min.map(|v| v.saturating_mul(1 << finer));
+            let spacing = self.spacing * f64::from(1u32 << level);
+            self.source.bound(&SourceRegion { min, size: region.size.map(size), level, spacing })
+        };
         match self.source.bound(&region) {
-            Bound::Outside => true,
+            Bound::Outside => (0..leaf.level).all(|level| at(level) == Bound::Outside),
             Bound::Inside { .. } => {
                 let cut = |planes| Border::new(planes).cuts(leaf.level, region.min, region.size);
-                !self.planes.is_some_and(cut)
+                let is_inside = |level: u8| matches!(at(level), Bound::Inside { .. });
+                !self.planes.is_some_and(cut) && (0..leaf.level).all(is_inside)
             }
             Bound::Mixed => false,
         }

@@ -323,7 +323,7 @@ impl LevelCover {
         let whole = filled.iter().filter(|leaf| !refined.is_split(**leaf));
         let merges = whole.map(|&key| Step::Merge { key, is_empty: false });
         let splits = (self.nodes.len()..refined.nodes.len()).step_by(8).map(|first| refined.split_step(first));
-        self.clone().try_steps(&merges.chain(splits).collect::<Vec<_>>())
+        Some(self.clone().try_steps(&merges.chain(splits).collect::<Vec<_>>())?.change)
     }
 
     /// All that is left on the way to another cover, as one change.

@@ -18,15 +18,18 @@ struct Bumps {
 }
 
 impl Bumps {
-    /// The distance in world units, without what differs from level to level.
-    fn distance(&self, position: [f64; 3]) -> f64 {
+    /// The distance in world units, without the noise of coarse levels, which do not see the bumps.
+    fn distance(&self, position: [f64; 3], level: u8) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|axis| position[axis] - self.middle[axis]);
-        (x * x + y * y + z * z).sqrt() - self.radius + (x / 3.0).sin() + (y / 4.0).cos() * (z / 3.5).sin()
+        let bumps = 2.0 * (x / 3.0).sin() + (y / 4.0).cos() * (z / 3.5).sin();
+        (x * x + y * y + z * z).sqrt() - self.radius + if level == 0 { bumps } else { 0.0 }
     }
 }
 
-/// The most by which the distance of [`Bumps`] differs from that of its ball, at any level, in world units.
-const MOST_OFF: f64 = 3.0;
+/// The most by which the distance of [`Bumps`] differs from that of its ball at a level, in world units.
+const fn most_off(level: u8) -> f64 {
+    if level == 0 { 3.0 } else { 0.5 }
+}
 
 impl Source for Bumps {
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
@@ -37,7 +40,7 @@ impl Source for Bumps {
             let point = [0, 1, 2].map(|axis| region.min[axis] + at[axis] as i32);
             let mut random = Rng::with_seed(random(region.level.into(), point));
             let jitter = if region.level == 0 { 0.0 } else { random.f64() - 0.5 };
-            *distance = ((self.distance(position) + jitter) / region.spacing) as f32;
+            *distance = ((self.distance(position, region.level) + jitter) / region.spacing) as f32;
             *material = random.u8(1..5);
         }
     }
@@ -52,9 +55,9 @@ impl Source for Bumps {
             (nearest, farthest) = (nearest + near * near, farthest + far * far);
         }
         let [nearest, farthest] = [nearest, farthest].map(|square| square.sqrt() - self.radius);
-        if nearest > MOST_OFF {
+        if nearest > most_off(region.level) {
             Bound::Outside
-        } else if farthest < -MOST_OFF {
+        } else if farthest < -most_off(region.level) {
             Bound::Inside { material: 1 }
         } else {
             Bound::Mixed
