@@ -19,8 +19,8 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 7)]
     seed: u32,
 
-    /// How far one sees, in voxels.
-    #[arg(long, value_name = "VOXELS", value_parser = radius, default_value = "384")]
+    /// How far one sees, in voxels; beyond 512, at several levels of detail.
+    #[arg(long, value_name = "VOXELS", value_parser = radius, default_value = "4096")]
     radius: f32,
 
     /// How fast the flight is, in voxels per second.

@@ -2,7 +2,8 @@
 //!
 //! It flies on by itself; F stops and starts that, the keys 1 to 9 set the speed. Click to grab the mouse, Esc frees
 //! it. W, A, S, D, Space and Shift fly, Ctrl flies faster, a click digs. G shows the chunks: drawn ones blue, waiting
-//! ones orange, empty ones as small grey cubes. The panel tells what loading costs.
+//! ones orange, empty ones as small grey cubes. L shows them in the colours of their levels of detail. The panel tells
+//! what loading costs.
 //!
 //! `--screenshot` renders a picture without a window; `--headless`, or no display, flies without any renderer, one line
 //! of figures an update. See `--help`.

@@ -8,6 +8,7 @@ use bevy::window::{CursorOptions, PrimaryWindow};
 use bevy_egui::input::egui_wants_any_keyboard_input;
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
 use bevy_marchless::diagnostics::TerrainDiagnosticsPlugin;
+use bevy_marchless::gizmos::ChunkColors;
 use bevy_marchless::prelude::*;
 use bevy_marchless::stats::TerrainStats;
 use marchless_examples::camera::{FlyCamera, mouse_is_grabbed};
@@ -17,14 +18,22 @@ use crate::flight::Flight;
 use crate::world::{RADII, World};
 
 pub(crate) fn plugin(app: &mut App) {
-    let show_chunks = show_chunks.run_if(input_just_pressed(KeyCode::KeyG)).run_if(not(egui_wants_any_keyboard_input));
+    let show_chunks = show_chunks.run_if(input_just_pressed(KeyCode::KeyG));
+    let show_levels = show_levels.run_if(input_just_pressed(KeyCode::KeyL));
     app.add_plugins((EguiPlugin::default(), figures::plugin))
-        .add_systems(Update, show_chunks)
+        .add_systems(Update, (show_chunks, show_levels).run_if(not(egui_wants_any_keyboard_input)))
         .add_systems(EguiPrimaryContextPass, (show_panel, draw_crosshair.run_if(mouse_is_grabbed)).chain());
 }
 
-fn show_chunks(mut show: ResMut<ShowChunkBounds>) {
+fn show_chunks(mut show: ResMut<ShowChunkBounds>, mut colors: ResMut<ChunkColors>) {
     show.0 = !show.0;
+    *colors = ChunkColors::States;
+}
+
+/// Shows the chunks in the colours of their levels, or not at all.
+fn show_levels(mut show: ResMut<ShowChunkBounds>, mut colors: ResMut<ChunkColors>) {
+    show.0 = !show.0 || *colors != ChunkColors::Levels;
+    *colors = ChunkColors::Levels;
 }
 
 /// What the panel shows and changes.
@@ -114,6 +123,7 @@ fn show_keys(ui: &mut egui::Ui) {
             ("Ctrl", "faster"),
             ("left button", "dig"),
             ("G", "chunks: drawn blue, waiting orange, empty grey"),
+            ("L", "chunks in the colours of their levels"),
         ] {
             row(ui, key, what);
         }

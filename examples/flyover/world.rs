@@ -19,8 +19,12 @@ pub(crate) struct World {
 }
 
 /// How far one may see. [Units: voxels]
-pub(crate) const RADII: RangeInclusive<f32> = 64.0..=1_024.0;
-/// How high and low the viewer's range reaches at most, so that its chunks are not too many. [Units: voxels]
+pub(crate) const RADII: RangeInclusive<f32> = 64.0..=4_096.0;
+/// Up to here all ground is of the finest level; farther views have several levels of detail. [Units: voxels]
+const ONE_LEVEL: f32 = 512.0;
+const LEVELS: u8 = 6;
+/// How high and low the viewer's range reaches at most with one level, so that its chunks are not too many.
+/// [Units: voxels]
 const HEIGHT: f32 = 448.0;
 /// Between these heights most of the ground lies. [Units: voxels]
 const RELIEF: [f32; 2] = [-42.0, 40.0];
@@ -57,7 +61,12 @@ impl World {
     /// # Errors
     /// As [`Self::source`].
     pub(crate) fn terrain(&self) -> Result<Terrain, SourceError> {
-        Ok(Terrain::endless(self.source()?).with_palette(LOOKS[self.look].palette()))
+        let levels = self.levels();
+        Ok(Terrain::endless(self.source()?).with_palette(LOOKS[self.look].palette()).with_levels(levels))
+    }
+
+    fn levels(&self) -> u8 {
+        if self.radius > ONE_LEVEL { LEVELS } else { 1 }
     }
 
     /// What makes an entity see it.
@@ -80,7 +89,13 @@ fn follow_world(
     world: Res<World>,
     mut scene: ResMut<Scene>,
     mut viewers: Query<(&mut TerrainViewer, Option<&mut Projection>)>,
+    mut terrains: Query<&mut Terrain>,
 ) {
+    for mut terrain in &mut terrains {
+        if terrain.levels.count != world.levels() {
+            terrain.levels.count = world.levels();
+        }
+    }
     let end = Some(FADED * world.radius);
     *scene = Scene { look: world.look, relief: RELIEF, size: 0.4 * world.radius, end };
     for (mut viewer, projection) in &mut viewers {

@@ -293,8 +293,8 @@ fn without_a_display_a_piece_falls_and_comes_to_rest() {
 #[test]
 fn bad_flights_are_refused() {
     let refused = |args: &[&str], because| assert_refused_by("flyover", args, because);
-    for radius in ["", "0", "63", "1025", "-100", "NaN", "inf", "far"] {
-        refused(&[&format!("--radius={radius}")], "a number from 64 to 1024");
+    for radius in ["", "0", "63", "4097", "-100", "NaN", "inf", "far"] {
+        refused(&[&format!("--radius={radius}")], "a number from 64 to 4096");
     }
     for speed in ["", "-1", "NaN", "1e9", "fast"] {
         refused(&[&format!("--speed={speed}")], "a number from 0 to 100000");

@@ -21,12 +21,25 @@ use crate::terrain::TerrainVolume;
 #[reflect(Resource, Default, Debug, PartialEq, Clone)]
 pub struct ShowChunkBounds(pub bool);
 
+/// What the colours of chunk bounds tell. Default: states.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Default, Debug, PartialEq, Clone)]
+pub enum ChunkColors {
+    /// Whether a chunk is drawn, waits or is empty.
+    #[default]
+    States,
+    /// The levels of detail of drawn chunks. Chunks without a mesh are not shown.
+    Levels,
+}
+
 /// The gizmo group of chunk bounds: their colours. Line width and more can be set in the `GizmoConfigStore`.
 #[derive(Reflect, GizmoConfigGroup, Clone, Debug)]
 #[reflect(Default, Debug, Clone)]
 pub struct ChunkBoundsGizmos {
-    /// The colour of chunks whose mesh is not empty.
+    /// The colour of chunks whose mesh is not empty, with [`ChunkColors::States`].
     pub drawn: Color,
+    /// The colours of drawn chunks by their level, with [`ChunkColors::Levels`].
+    pub levels: [Color; 7],
     /// The colour of chunks that wait to be filled or meshed.
     pub waiting: Color,
     /// The colour of chunks without a surface, drawn as a small cube in the middle of each.
@@ -39,6 +52,15 @@ impl Default for ChunkBoundsGizmos {
     fn default() -> Self {
         Self {
             drawn: Color::srgb(0.35, 0.55, 0.75),
+            levels: [
+                Color::srgb(0.95, 0.30, 0.25),
+                Color::srgb(0.98, 0.65, 0.15),
+                Color::srgb(0.90, 0.90, 0.20),
+                Color::srgb(0.35, 0.80, 0.30),
+                Color::srgb(0.20, 0.70, 0.85),
+                Color::srgb(0.40, 0.45, 0.95),
+                Color::srgb(0.80, 0.40, 0.90),
+            ],
             waiting: Color::srgb(1.0, 0.45, 0.1),
             empty: Color::srgba(0.6, 0.6, 0.6, 0.35),
             terrain: Color::srgb(0.9, 0.75, 0.3),
@@ -61,14 +83,18 @@ pub struct ChunkGizmosPlugin;
 
 impl Plugin for ChunkGizmosPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<ShowChunkBounds>().register_type::<ShowChunkBounds>().register_type::<ChunkBoundsGizmos>();
+        app.init_resource::<ShowChunkBounds>()
+            .init_resource::<ChunkColors>()
+            .register_type::<ShowChunkBounds>()
+            .register_type::<ChunkColors>()
+            .register_type::<ChunkBoundsGizmos>();
     }
 
     fn finish(&self, app: &mut App) {
         if app.is_plugin_added::<GizmoPlugin>() {
             app.init_gizmo_group::<ChunkBoundsGizmos>().add_systems(
                 PostUpdate,
-                (draw_drawn, draw_others, draw_terrains)
+                (draw_drawn, draw_others.run_if(resource_equals(ChunkColors::States)), draw_terrains)
                     .after(TransformSystems::Propagate)
                     .run_if(|show: Res<ShowChunkBounds>| show.0),
             );
@@ -79,13 +105,18 @@ impl Plugin for ChunkGizmosPlugin {
 fn draw_drawn(
     chunks: Query<(&Chunk, &ChunkGeometry, &GlobalTransform)>,
     volumes: Query<&TerrainVolume>,
+    colors: Res<ChunkColors>,
     mut gizmos: Gizmos<ChunkBoundsGizmos>,
 ) {
-    let color = gizmos.config_ext.drawn;
+    let (drawn, levels) = (gizmos.config_ext.drawn, gizmos.config_ext.levels);
     for (chunk, geometry, transform) in &chunks {
         if let Ok(volume) = volumes.get(chunk.terrain)
             && !geometry.mesh.is_empty()
         {
+            let color = match *colors {
+                ChunkColors::States => drawn,
+                ChunkColors::Levels => levels[usize::from(chunk.level).min(levels.len() - 1)],
+            };
             gizmos.aabb_3d(inset(volume.grid().chunk_cells()), *transform, color);
         }
     }

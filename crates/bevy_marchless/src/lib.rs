@@ -105,7 +105,7 @@ pub mod prelude {
     pub use crate::query::{TerrainHit, TerrainQuery};
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
     pub use crate::stream::TerrainViewer;
-    pub use crate::terrain::{Extent, Keep, Palette, Terrain, TerrainVolume};
+    pub use crate::terrain::{Extent, Keep, Palette, Terrain, TerrainLevels, TerrainVolume};
 }
 
 plugin_group! {

@@ -151,6 +151,9 @@ impl TerrainDescription {
         if before.is_none_or(|before| before.keep != self.keep) {
             next.keep = self.keep;
         }
+        if before.is_none_or(|before| before.levels != self.levels) {
+            next.levels = self.levels;
+        }
         next.check()?;
         *terrain = next;
         Ok(())

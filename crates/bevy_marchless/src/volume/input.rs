@@ -12,7 +12,7 @@ use marchless::{
 /// What the mesh of a chunk is made from.
 pub(crate) enum MeshInput {
     /// The samples of a chunk of the finest level, and of the chunks around it.
-    Finest(Neighbourhood<i16>),
+    Finest(Box<Neighbourhood<i16>>),
     /// What the samples of a coarser leaf are made from.
     Coarser(Box<LeafInput>),
 }

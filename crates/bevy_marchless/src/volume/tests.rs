@@ -437,7 +437,7 @@ impl Game {
             assert_eq!(state.is_some(), heart.table.is_leaf(key));
             let is_despawned = self.despawned.contains(&key) && heart.entity(key).is_none();
             if let Some(state) = state.filter(|_| !is_despawned) {
-                let input = MeshInput::Finest(fresh.neighbourhood_view(position).to_neighbourhood());
+                let input = MeshInput::Finest(Box::new(fresh.neighbourhood_view(position).to_neighbourhood()));
                 let expected = meshed(&input, key, &settings).geometry;
                 let wanted = if expected.is_empty() { LeafState::Empty } else { LeafState::Drawn };
                 assert_eq!(state, wanted, "{position:?}");

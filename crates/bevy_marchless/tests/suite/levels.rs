@@ -10,7 +10,7 @@ use bevy_ecs::system::RunSystemOnce as _;
 use bevy_marchless::prelude::*;
 use bevy_marchless::stats::TerrainStats;
 use bevy_marchless::stream::LeafState;
-use bevy_marchless::terrain::{TerrainError, TerrainLevels};
+use bevy_marchless::terrain::TerrainError;
 use bevy_math::{DVec3, Dir3, IVec3, Ray3d, Vec3};
 use bevy_transform::components::Transform;
 use fastrand::Rng;
@@ -101,7 +101,7 @@ fn fly(mut app: App, updates: u32, seed: u64) {
         }
         if random.u32(0..3) == 0 {
             let stamp = stamp(&mut random, ground);
-            stamps.push(stamp.clone());
+            stamps.push(stamp);
             app.world_mut().write_message(stamp);
         }
         app.update();
