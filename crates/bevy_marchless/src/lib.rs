@@ -75,6 +75,10 @@ pub mod gizmos;
 pub mod in_your_game {}
 pub mod inherit;
 mod jobs;
+/// Levels of detail: how to set them, what is guaranteed, and what they cost.
+///
+#[doc = include_str!("../docs/levels.md")]
+pub mod levels_of_detail {}
 #[cfg(feature = "pbr")]
 pub mod material;
 pub mod mesh;

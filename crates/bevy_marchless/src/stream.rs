@@ -56,6 +56,10 @@ impl Plugin for StreamPlugin {
 /// eighth of a chunk. At most [`Terrain::MAX_CHUNKS`](crate::terrain::Terrain::MAX_CHUNKS) chunks are loaded: larger
 /// radii are scaled down, with a warning.
 ///
+/// A terrain with several [levels of detail](crate::levels_of_detail) is drawn as far as the longest radius reaches, and
+/// loads samples of the finest level alone; `margin` and `sample_radius` do not matter to it. A radius that would make
+/// too many leaves is reported, and what is drawn stays.
+///
 /// A viewer whose position is not finite or whose radii are not above 0 is reported once; its loaded chunks stay. A
 /// terrain that loads nothing by itself is reported, too, after 120 updates without any viewer.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use bevy_reflect::prelude::*;
 use super::TerrainError;
 use crate::volume::LevelDetail;
 
-/// How a terrain's detail falls off with distance from its viewers.
+/// How a terrain's detail falls off with distance from its viewers; see [`levels_of_detail`](crate::levels_of_detail).
 ///
 /// Level 0 is the finest. A chunk of level `k` is as wide as 2ᵏ chunks of level 0, and has as many cells, so it is drawn
 /// with about as many triangles. Chunks of all levels form one surface without gaps: each chunk's mesh fits the meshes

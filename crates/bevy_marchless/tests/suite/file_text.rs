@@ -163,8 +163,19 @@ fn description() -> impl Strategy<Value = TerrainDescription> {
     let color = prop::array::uniform4(0f32..1.0).prop_map(|[r, g, b, a]| bevy_color::Color::srgba(r, g, b, a));
     let color = prop_oneof![color, Just(bevy_color::Color::hsl(20.0, 0.5, 0.5))];
     let palette = prop::collection::vec(color, 0..3).prop_map(Palette::new);
-    (source, palette, 1e-3f32..1e3, extent(), keep()).prop_map(|(source, palette, voxel_size, extent, keep)| {
-        TerrainDescription { source, palette, voxel_size, extent, keep }
+    let levels = (1..8u8, 1.75..64.0f32, 0.0..1.0f32).prop_map(|(count, falloff, hysteresis)| TerrainLevels {
+        count,
+        falloff,
+        hysteresis,
+    });
+    let all = (source, palette, 1e-3f32..1e3, extent(), keep(), levels);
+    all.prop_map(|(source, palette, voxel_size, extent, keep, levels)| TerrainDescription {
+        source,
+        palette,
+        voxel_size,
+        extent,
+        keep,
+        levels,
     })
 }
 
@@ -297,6 +308,7 @@ fn settings_out_of_range_are_refused_with_their_lines() {
     }
     for (text, lines, words) in [
         ("(source: Air,\nvoxel_size: -0.1)", &[2][..], "line 2: a terrain's voxel size"),
+        ("(source: Air, levels: (count: 8))", &[], "levels.count"),
         ("(source: Air, extent: (y: (0, 4)))", &[], "keep"),
         ("(source: Air, extent: (y: (4, 4)), keep: Nothing)", &[], "extent"),
     ] {

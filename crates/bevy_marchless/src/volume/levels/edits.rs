@@ -55,11 +55,15 @@ impl Heart {
             .filter(|(leaf, is_empty)| *is_empty && !surfaces.is_empty(*leaf))
             .map(|(leaf, _)| leaf)
             .collect();
-        let viewers = levels.viewers();
-        let change = match cover.fill(&filled, &viewers, &levels.settings, |leaf| surfaces.is_empty(leaf)) {
-            Ok(change) => Arc::new(change),
-            Err(error) => return bevy_log::warn!("an edit in an empty part of a terrain is not shown: {error}"),
-        };
+        let mut change = LevelChange::default();
+        if !filled.is_empty() {
+            let viewers = levels.viewers();
+            match cover.fill(&filled, &viewers, &levels.settings, |leaf| surfaces.is_empty(leaf)) {
+                Ok(filling) => change = filling,
+                Err(error) => return bevy_log::warn!("an edit in an empty part of a terrain is not shown: {error}"),
+            }
+        }
+        let change = Arc::new(change);
         // Changes to come may add leaves that were empty when they were planned.
         let is_out_of_date = |other: &LevelChange| other.overlaps(&change) || has_filled(other, &surfaces);
         let gone = levels.withdraw(|running| is_out_of_date(&running.change));
