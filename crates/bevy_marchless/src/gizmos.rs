@@ -130,7 +130,7 @@ fn draw_others(volumes: Query<(&TerrainVolume, &GlobalTransform)>, mut gizmos: G
         let cells = settings.chunk_cells;
         let middle = Vec3::splat(0.5 * cells as f32);
         let mark = 0.5 * EMPTY_SHARE * cells as f32;
-        for leaf in volume.heart().leaves() {
+        for leaf in volume.leaves() {
             let key = ChunkKey { level: leaf.level, position: leaf.position.to_array() };
             let transform = to_world.mul_transform(chunk_transform(key, cells, settings.voxel_size));
             match leaf.state {

@@ -255,7 +255,7 @@ impl Heart {
         Some(Leaf { level: 0, position: position.into(), state })
     }
 
-    /// All leaves that have come; those in views that are still to come are left out.
+    /// All leaves, in no order; with one level, those that have come.
     pub(crate) fn leaves(&self) -> impl Iterator<Item = Leaf> + '_ {
         let levels = self.levels.iter().flat_map(|levels| levels.leaves(&self.table));
         let keys = self.levels.is_none().then(|| self.table.keys()).into_iter().flatten();

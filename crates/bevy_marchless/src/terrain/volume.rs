@@ -80,6 +80,11 @@ impl TerrainVolume {
         self.heart.leaf_at(position.to_array())
     }
 
+    /// All leaves, in no order. With one level, those in range that have not been visited yet are left out.
+    pub fn leaves(&self) -> impl Iterator<Item = Leaf> + '_ {
+        self.heart.leaves()
+    }
+
     /// The number of leaves in each state. The more chunks have just come into range, the longer this takes.
     pub fn coverage(&self) -> Coverage {
         self.heart.coverage()
