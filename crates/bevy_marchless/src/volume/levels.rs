@@ -73,7 +73,7 @@ pub(super) struct Levels {
     finest: HashMap<[i32; 3], bool>,
     surfaces: Arc<Surfaces>,
     source: Arc<CachedSource>,
-    /// The settings for which there would be too many leaves, if that has been reported.
+    /// Whether it has been reported that there would be too many leaves.
     has_too_many: bool,
 }
 
@@ -139,6 +139,16 @@ impl Running {
     fn is_meshed(&self) -> bool {
         self.meshing.as_ref().is_some_and(|meshing| meshing.meshed.len() == meshing.members)
     }
+}
+
+/// Whether the mesh of a leaf reads any of these lattice points.
+fn reads(leaf: ChunkKey, points: Region, cells: u32) -> bool {
+    let cells = i64::from(cells);
+    (0..3).all(|axis| {
+        let low = i64::from(leaf.position[axis]) * cells;
+        let [low, high] = [low - 1, low + cells + 2].map(|v| v << leaf.level);
+        low < points.max[axis].into() && high > points.min[axis].into()
+    })
 }
 
 /// The leaves of a change that get a mesh.
@@ -270,26 +280,15 @@ impl Levels {
         })
     }
 
-    /// Whether the meshes of this leaf read any of these lattice points.
-    fn reads(&self, key: ChunkKey, points: Region, cells: u32) -> bool {
-        let cells = i64::from(cells);
-        (0..3).all(|axis| {
-            let low = i64::from(key.position[axis]) * cells;
-            let [low, high] = [low - 1, low + cells + 2].map(|v| v << key.level);
-            low < points.max[axis].into() && high > points.min[axis].into()
-        })
-    }
-
     /// The coarser leaves that are drawn and read these lattice points.
     fn drawn_readers(&self, points: Region, cells: u32) -> Vec<ChunkKey> {
         let chunk = |v: i32| v.div_euclid(cells as i32);
         let chunks = Region::new(points.min.map(chunk), points.max.map(|v| chunk(v - 1) + 1));
         // A reader touches the points' chunks, or reaches one point of its own level beyond itself.
-        let reach = 1 << self.settings.levels;
-        let reach = (reach / cells as i32 + 1).min(1 << 7);
-        let leaves = self.shown.leaves_near(chunks.grown(reach as u32, reach as u32));
+        let reach = (1u32 << self.settings.levels).div_ceil(cells);
+        let leaves = self.shown.leaves_near(chunks.grown(reach, reach));
         let leaves = leaves.into_iter().filter(|(leaf, is_empty)| leaf.level > 0 && !is_empty);
-        leaves.map(|(leaf, _)| leaf.into()).filter(|key| self.reads(*key, points, cells)).collect()
+        leaves.map(|(leaf, _)| leaf.into()).filter(|key| reads(*key, points, cells)).collect()
     }
 
     /// Takes in that chunks of the finest level are not drawn any more, or do not come with a change that was withdrawn.
@@ -333,12 +332,10 @@ impl Levels {
 
     /// Notes that edits have changed lattice points: meshes that were made before are out of date.
     fn note_edit(&mut self, points: Region, cells: u32) {
-        let mut running = core::mem::take(&mut self.running);
-        for running in running.values_mut() {
+        for running in self.running.values_mut() {
             let Running { change, meshing: Some(meshing), .. } = running else { continue };
-            meshing.stale.extend(members(change).filter(|key| self.reads(*key, points, cells)));
+            meshing.stale.extend(members(change).filter(|key| reads(*key, points, cells)));
         }
-        self.running = running;
     }
 }
 
