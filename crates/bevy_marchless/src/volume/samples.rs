@@ -133,8 +133,8 @@ impl SampleStore {
     /// What edits a leaf's samples need: stamps in order, and the held chunks, whose stamps are not kept.
     pub(super) fn edits_around(&self, leaf: LeafKey) -> (Vec<QuantisedStamp>, Option<Grid<i16>>) {
         let chunks = leaf.region();
-        // A leaf reads one lattice point of its level beyond itself.
-        let reach = (1u32 << leaf.level).div_ceil(self.newest.chunk_cells());
+        // A leaf reads one lattice point of its level beyond its border.
+        let reach = (1u32 << leaf.level) / self.newest.chunk_cells() + 1;
         let chunks = chunks.grown(reach, reach);
         let ends = [chunks.min, chunks.max].map(|end| self.newest.chunk_region(end).min);
         let stamps = self.log.concerning(chunks, Region::new(ends[0], ends[1]), 0);
