@@ -34,6 +34,8 @@ pub(crate) const FLIGHT_LEVEL: f32 = 60.0;
 const TUNNELS: f64 = 28.0;
 /// How deep the ground's own colours reach; below is rock. [Units: voxels]
 const TOPSOIL: f64 = 2.0;
+/// How far from the eye the view has shadows, at most. [Units: voxels]
+const SHADOWS: f32 = 1_024.0;
 /// The share of the range at which everything has faded, so that its end is not seen.
 const FADED: f32 = 0.95;
 
@@ -97,7 +99,9 @@ fn follow_world(
         }
     }
     let end = Some(FADED * world.radius);
-    *scene = Scene { look: world.look, relief: RELIEF, size: 0.4 * world.radius, end };
+    // Shadows farther away than this would be coarse ones near by.
+    let size = 0.4 * world.radius.min(SHADOWS);
+    *scene = Scene { look: world.look, relief: RELIEF, size, end };
     for (mut viewer, projection) in &mut viewers {
         viewer.set_if_neq(world.viewer());
         if let Some(Projection::Perspective(mut perspective)) = projection.as_deref().cloned() {
