@@ -163,7 +163,8 @@ impl Plan {
             let planned = &mut self.changes[index];
             planned.after.push(id);
             planned.waits -= 1;
-            if planned.waits == 0 {
+            // It may have been withdrawn while it waited.
+            if planned.waits == 0 && !planned.has_started {
                 self.ready.push(Reverse((planned.urgency, index)));
             }
         }
