@@ -25,6 +25,8 @@ mod file_follow;
 #[cfg(all(feature = "terrain_files", feature = "noise", feature = "png"))]
 mod file_text;
 mod fixed_update;
+#[cfg(feature = "gizmos")]
+mod gizmos;
 mod hierarchy;
 mod isovalue;
 mod levels;
