@@ -13,6 +13,8 @@ const WITHIN: i32 = 600;
 const EYE_LEVEL: f32 = 12.0;
 /// The hole's radius. [Units: voxels]
 const HOLE: f32 = 14.0;
+/// The hole is at most this far away, so that it is seen in a wide view, too. [Units: voxels]
+const NEARBY: f32 = 230.0;
 /// How fast the journey is. [Units: voxels per update]
 const PACE: f32 = 64.0;
 /// In so many updates everything has noticed that a viewer has moved.
@@ -98,7 +100,7 @@ fn go_on(
             // To the right and down, as little as meets ground nearby.
             let hit = (4..20).find_map(|steep| {
                 let direction = Dir3::new(Vec3::new(0.3, -0.1 * steep as f32, -1.0)).ok()?;
-                query.ray_cast_terrain(terrain, Ray3d::new(visit.eye, direction), 0.6 * world.radius)
+                query.ray_cast_terrain(terrain, Ray3d::new(visit.eye, direction), NEARBY.min(0.6 * world.radius))
             });
             let Some(hit) = hit else {
                 eprintln!("flyover: there is nothing to dig.");
