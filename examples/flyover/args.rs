@@ -31,6 +31,10 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(..LOOKS.len() as i64))]
     look: u8,
 
+    /// Show the edges of all triangles, in the colours of their levels of detail.
+    #[arg(long, conflicts_with = "headless")]
+    pub(crate) triangles: bool,
+
     /// Render a picture without a window, and exit.
     #[arg(long, value_name = "FILE.png", conflicts_with = "headless")]
     pub(crate) screenshot: Option<PathBuf>,

@@ -2,8 +2,8 @@
 //!
 //! It flies on by itself; F stops and starts that, the keys 1 to 9 set the speed. Click to grab the mouse, Esc frees
 //! it. W, A, S, D, Space and Shift fly, Ctrl flies faster, a click digs. G shows the chunks: drawn ones blue, waiting
-//! ones orange, empty ones as small grey cubes. L shows them in the colours of their levels of detail. The panel tells
-//! what loading costs.
+//! ones orange, empty ones as small grey cubes. L shows them in the colours of their levels of detail, T all triangles
+//! in these colours. The panel tells what loading costs.
 //!
 //! `--screenshot` renders a picture without a window; `--headless`, or no display, flies without any renderer, one line
 //! of figures an update. See `--help`.
@@ -15,6 +15,7 @@ mod flight;
 mod headless;
 mod panel;
 mod picture;
+mod triangles;
 mod world;
 
 use std::process::ExitCode;
@@ -28,7 +29,7 @@ use marchless_examples::camera::FlyCameraPlugin;
 use marchless_examples::graphics;
 use marchless_examples::ground::GroundMaterial;
 use marchless_examples::look::LookPlugin;
-use marchless_examples::picture::{picture_plugins, window_plugins};
+use marchless_examples::picture::{FewColors, picture_plugins, window_plugins};
 
 use args::Args;
 
@@ -76,17 +77,22 @@ fn window_app(app: &mut App, args: &Args) {
         .insert_resource(args.flight())
         .insert_resource(args.world())
         .add_plugins((shown_plugin, FlyCameraPlugin, flight::plugin, dig::plugin, panel::plugin))
-        .add_systems(Startup, flight::spawn_camera);
+        .add_systems(Startup, (flight::spawn_camera, triangles::show_if(args.triangles)));
 }
 
 fn picture_app(app: &mut App, args: &Args) {
     app.add_plugins(picture_plugins())
         .insert_resource(args.world())
-        .add_plugins((shown_plugin, picture::HillPicturePlugin::new(args)));
+        .add_plugins((shown_plugin, picture::HillPicturePlugin::new(args)))
+        .add_systems(Startup, triangles::show_if(args.triangles));
+    if args.triangles {
+        // A picture of lines is large, and has few colours.
+        app.insert_resource(FewColors);
+    }
 }
 
 /// What window and picture have in common.
 fn shown_plugin(app: &mut App) {
     app.add_plugins((MarchlessPlugins, TerrainMaterialPlugin::<GroundMaterial>::default(), LookPlugin))
-        .add_plugins(world::plugin);
+        .add_plugins((world::plugin, triangles::plugin));
 }

@@ -15,13 +15,16 @@ use marchless_examples::camera::{FlyCamera, mouse_is_grabbed};
 
 use crate::figures::{self, PerSecond};
 use crate::flight::Flight;
+use crate::triangles;
 use crate::world::{RADII, World};
 
 pub(crate) fn plugin(app: &mut App) {
     let show_chunks = show_chunks.run_if(input_just_pressed(KeyCode::KeyG));
     let show_levels = show_levels.run_if(input_just_pressed(KeyCode::KeyL));
+    let show_triangles = triangles::show_or_hide.run_if(input_just_pressed(KeyCode::KeyT));
+    let keys = (show_chunks, show_levels, show_triangles).run_if(not(egui_wants_any_keyboard_input));
     app.add_plugins((EguiPlugin::default(), figures::plugin))
-        .add_systems(Update, (show_chunks, show_levels).run_if(not(egui_wants_any_keyboard_input)))
+        .add_systems(Update, keys)
         .add_systems(EguiPrimaryContextPass, (show_panel, draw_crosshair.run_if(mouse_is_grabbed)).chain());
 }
 
@@ -124,6 +127,7 @@ fn show_keys(ui: &mut egui::Ui) {
             ("left button", "dig"),
             ("G", "chunks: drawn blue, waiting orange, empty grey"),
             ("L", "chunks in the colours of their levels"),
+            ("T", "triangles in the colours of their levels"),
         ] {
             row(ui, key, what);
         }

@@ -307,6 +307,7 @@ fn bad_flights_are_refused() {
     refused(&["--moment", "back"], "--screenshot");
     refused(&["--screenshot", "a.png", "--moment", "never"], "arrived, dug, back");
     refused(&["--headless", "--screenshot", "a.png"], "--headless");
+    refused(&["--headless", "--triangles"], "--triangles");
     refused(&["--screenshot", "a.jpg"], ".png");
     refused(&["--headless", "--csv", "missing_folder/a.csv"], "no folder missing_folder");
     refused(&["--headless", "--csv", "."], "folder");
