@@ -160,6 +160,48 @@ fn an_endless_world_ends_in_haze_and_keeps_what_was_dug() {
 }
 
 #[test]
+fn triangles_show_levels_that_get_coarser_with_distance() {
+    let path = picture_path("flyover_triangles");
+    let flags = ["--size", SIZE, "--radius", "513", "--triangles"];
+    let Some(_) = render(example("flyover").args(flags).arg("--screenshot").arg(&path)) else { return };
+    let picture = Picture::read(&path);
+    // Level 0 is red, level 1 orange, level 2 yellow. Sky and snow have more blue, meadows and rock less red.
+    let shares = [(0.0, 0.45), (0.5, 0.8), (0.85, 1.1)].map(|(least, most)| {
+        let pixels = picture.pixels.iter().enumerate().filter(|(_, pixel)| {
+            let [red, green, blue] = pixel.map(f64::from);
+            red > 180.0 && blue < 0.45 * red && (least * red..most * red).contains(&green)
+        });
+        let rows: Vec<_> = pixels.map(|(index, _)| (index / picture.width) as f64).collect();
+        (rows.len() as f64 / picture.pixels.len() as f64, rows.iter().sum::<f64>() / rows.len().max(1) as f64)
+    });
+    assert!(shares.iter().all(|(share, _)| *share > 0.02), "shares and mean rows: {shares:.3?}");
+    assert!(shares.is_sorted_by(|a, b| a.1 > b.1 + 10.0), "shares and mean rows: {shares:.3?}");
+}
+
+#[test]
+fn ground_at_coarse_levels_looks_like_ground_at_the_finest() {
+    // One sees 512 voxels far at one level, 513 at several: the finest, and two coarser ones behind it.
+    let [one, several] = ["512", "513"].map(|radius| {
+        let path = picture_path(&format!("flyover_{radius}"));
+        let flags = ["--size", SIZE, "--radius", radius];
+        render(example("flyover").args(flags).arg("--screenshot").arg(&path))?;
+        Some(Picture::read(&path))
+    });
+    let [Some(one), Some(several)] = [one, several] else { return };
+    one.assert_is_a_landscape();
+    // Where sky shone through the ground, or a splinter stood out, a pixel would differ.
+    let pairs = one.pixels.iter().zip(&several.pixels);
+    let differing = pairs.filter(|(a, b)| (0..3).any(|channel| a[channel].abs_diff(b[channel]) > 32)).count();
+    let share = differing as f64 / one.pixels.len() as f64;
+    assert!(share < 0.005, "{:.2} % of the pixels differ", 100.0 * share);
+    // Where materials or light were other ones, a whole patch would be of another colour.
+    let patches = [&one, &several].map(|picture| picture.patches(16, 12));
+    let differences = patches[0].iter().zip(&patches[1]).flat_map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).abs()));
+    let greatest = differences.fold(0.0, f64::max);
+    assert!(greatest < 10.0, "patches differ by up to {greatest:.1} of 255");
+}
+
+#[test]
 fn a_window_opens_and_shows_something() {
     let folder = folder_of_tests().join(format!("screen_{}", std::process::id()));
     fs::create_dir_all(&folder).expect("the folder of tests can be written");
@@ -338,7 +380,9 @@ impl Disc {
 impl Picture {
     fn read(path: &Path) -> Self {
         let file = BufReader::new(File::open(path).expect("the picture was written"));
-        let mut reader = png::Decoder::new(file).read_info().expect("it is a PNG picture");
+        let mut decoder = png::Decoder::new(file);
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().expect("it is a PNG picture");
         let mut bytes = vec![0; reader.output_buffer_size().expect("it is small")];
         let info = reader.next_frame(&mut bytes).expect("it is whole");
         assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
@@ -354,6 +398,18 @@ impl Picture {
             let inner = self.pixels.chunks_exact(self.width).take(rows * 4 / 5).skip(rows / 8);
             inner.flat_map(|row| row[columns.clone()].iter().copied()).collect()
         })
+    }
+
+    /// The mean colours of patches of this width and height, in pixels.
+    fn patches(&self, width: usize, height: usize) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.width / width * (self.pixels.len() / self.width / height)];
+        for (index, pixel) in self.pixels.iter().enumerate() {
+            let patch = index % self.width / width + index / self.width / height * (self.width / width);
+            for (sum, value) in sums[patch].iter_mut().zip(pixel) {
+                *sum += f64::from(*value) / (width * height) as f64;
+            }
+        }
+        sums
     }
 
     /// How much pixels differ from those below them, in rows given as shares of the height. [Units: levels of 255]
