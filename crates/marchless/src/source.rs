@@ -29,6 +29,7 @@ pub struct SourceRegion {
 
 impl SourceRegion {
     /// The world position (terrain space) of the point at `index`, which counts from the lowest point.
+    #[inline]
     pub fn position(&self, index: [u32; 3]) -> [f64; 3] {
         core::array::from_fn(|axis| (f64::from(self.min[axis]) + f64::from(index[axis])) * self.spacing)
     }

@@ -1,17 +1,22 @@
 //! [`LevelChange`]: from one cover to another, a few leaves at a time.
 
-use alloc::{vec, vec::Vec};
+use alloc::{collections::BTreeMap, vec, vec::Vec};
 
 use super::{
     LeafKey, LevelCover,
     balance::too_coarse,
+    neighbour,
     tree::{Node, State},
 };
 use crate::{lattice::Region, mesher::FinerNeighbours};
 
-/// The most steps of a change, and how many times another step may not fit before it stays as it is.
-const MOST_STEPS: usize = 12;
-const MOST_FAILURES: usize = 2;
+/// The most steps of a change that grows, and how many steps beside it may not fit before it stays as it is.
+const MOST_STEPS: usize = 24;
+const MOST_FAILURES: usize = 5;
+/// The most steps that are made together because one alone would not fit; as long as nothing fits, it is doubled, up to
+/// [`MOST_TOGETHER_AT_LAST`].
+const MOST_TOGETHER: usize = 4;
+const MOST_TOGETHER_AT_LAST: usize = 128;
 
 /// A change of a few leaves of a [`LevelCover`] that can be shown at once: nothing is then uncovered, covered twice or
 /// cracked.
@@ -42,6 +47,24 @@ impl LevelChange {
     pub fn region(&self) -> Region {
         let regions = self.leaves().map(LeafKey::region);
         regions.reduce(|a, b| a.union(&b)).unwrap_or(Region::new([0; 3], [0; 3]))
+    }
+
+    /// This change and a later one as one.
+    fn then(&self, later: &Self) -> Self {
+        let stays = |leaf: &LeafKey| !later.removed.contains(leaf);
+        let is_new = |leaf: &LeafKey| self.added.iter().any(|(added, _)| added == leaf);
+        let mut both = self.clone();
+        both.added.retain(|(leaf, _)| stays(leaf));
+        both.added.extend(&later.added);
+        both.removed.extend(later.removed.iter().filter(|leaf| !is_new(leaf)));
+        both.remeshed.retain(stays);
+        both.remeshed.extend(later.remeshed.iter().filter(|leaf| !is_new(leaf)));
+        both.added.sort_unstable();
+        both.removed.sort_unstable();
+        both.remeshed.sort_unstable();
+        both.remeshed.dedup();
+        both.steps.extend(&later.steps);
+        both
     }
 
     /// The number of leaves that are to be meshed.
@@ -88,6 +111,14 @@ struct Made {
     nodes: usize,
 }
 
+/// Why steps cannot be made.
+enum Misfit {
+    /// This leaf would be too coarse for what is beside it.
+    TooCoarse(LeafKey),
+    /// These two leaves and finer ones would alternate at the edge that they share.
+    Alternate([LeafKey; 2]),
+}
+
 /// What takes a [`Step`] back.
 enum Undo {
     State { index: u32, state: State },
@@ -107,7 +138,7 @@ impl LevelCover {
 
     /// The first `most` changes of a [way](Self::changes_to) to another cover, and whether they lead all the way there.
     /// `urgency`: of splitting a chunk, or of putting it together; of the changes that may be made, the one with the
-    /// lowest number comes first.
+    /// lowest number comes first, and before all of them, chunks of the coarsest level come into view.
     ///
     /// Changes beside each other become one while it has at most `meshes` leaves to be meshed; so a leaf between them is
     /// meshed once. With 0, all stay apart. A change that cannot be made in parts may have more.
@@ -116,67 +147,85 @@ impl LevelCover {
         target: &Self,
         most: usize,
         meshes: usize,
-        mut urgency: impl FnMut(LeafKey) -> u32,
+        urgency: impl Fn(LeafKey) -> u32,
     ) -> Option<(Vec<LevelChange>, bool)> {
         if self.top != target.top {
             return None;
         }
         let (mut cover, mut changes) = (self.clone(), Vec::new());
+        let mut together = MOST_TOGETHER;
         loop {
-            let mut steps = cover.steps_to(target, None);
-            if steps.is_empty() || changes.len() >= most {
-                return Some((changes, steps.is_empty()));
-            }
-            steps.sort_by_cached_key(|step| urgency(step.key()));
             let made = changes.len();
-            for step in steps {
+            // What is not there at all comes first.
+            let of = |step: Step| if matches!(step, Step::AddRoot { .. }) { 0 } else { urgency(step.key()) };
+            let by_urgency = |step: Step| ((of(step), step.key()), step);
+            let mut queue: BTreeMap<_, _> = cover.steps_to(target, None).into_iter().map(by_urgency).collect();
+            if queue.is_empty() || changes.len() >= most {
+                return Some((changes, queue.is_empty()));
+            }
+            while changes.len() < most
+                && let Some(((urgent, _), step)) = queue.pop_first()
+            {
                 // An earlier change may have made the step already.
-                if changes.len() < most && cover.lacks(step) {
-                    changes.extend(cover.grow_change(step, target, meshes, &mut urgency));
+                if !cover.lacks(step) {
+                    continue;
+                }
+                match cover.try_step(step, target, together) {
+                    Ok(change) => {
+                        let change = cover.grow(change, target, meshes, &urgency);
+                        // Beside it, others may have become possible.
+                        queue.extend(cover.steps_to(target, Some(&change.region())).into_iter().map(by_urgency));
+                        changes.push(change);
+                    }
+                    Err(Some(first)) => _ = queue.insert((urgent, first.key()), first),
+                    Err(None) => {}
                 }
             }
-            if changes.len() == made {
-                // Each step alone would leave a cover that does not fit; all of them together do.
+            if changes.len() > made {
+                together = MOST_TOGETHER;
+            } else if together < MOST_TOGETHER_AT_LAST {
+                together *= 2;
+            } else {
+                // Each step would leave a cover that does not fit; all of them together do.
                 changes.extend(cover.all_at_once(target));
                 return Some((changes, true));
             }
         }
     }
 
-    /// Makes a step, if the cover then fits, with steps beside it as long as few leaves are to be meshed.
-    fn grow_change(
+    /// Makes steps beside a change that has been made, as long as few leaves are to be meshed. Those of its level come
+    /// first, as they have the most neighbours in common with it.
+    fn grow(
         &mut self,
-        step: Step,
+        mut change: LevelChange,
         target: &Self,
         meshes: usize,
-        urgency: &mut impl FnMut(LeafKey) -> u32,
-    ) -> Option<LevelChange> {
-        let mut made = self.try_steps(&[step])?;
-        let mut tried = vec![step.key()];
+        urgency: &impl Fn(LeafKey) -> u32,
+    ) -> LevelChange {
+        let mut tried: Vec<LeafKey> = change.steps.iter().map(|step| step.key()).collect();
+        let level = tried[0].level;
         let mut failures = 0;
-        while failures < MOST_FAILURES && made.change.meshes() < meshes && made.change.steps.len() < MOST_STEPS {
-            let regions = made.change.steps.iter().map(|step| step.key().region());
-            let near = regions.reduce(|a, b| a.union(&b))?;
-            let mut steps = self.steps_to(target, Some(&near));
+        while failures < MOST_FAILURES && change.meshes() < meshes && change.steps.len() < MOST_STEPS {
+            let regions = change.steps.iter().map(|step| step.key().region());
+            let near = regions.reduce(|a, b| a.union(&b));
+            let mut steps = self.steps_to(target, near.as_ref());
             steps.retain(|step| !tried.contains(&step.key()));
-            let Some(next) = steps.into_iter().min_by_key(|step| urgency(step.key())) else { break };
+            let order = |step: &Step| (step.key().level.abs_diff(level), urgency(step.key()));
+            let Some(next) = steps.into_iter().min_by_key(order) else { break };
             tried.push(next.key());
-            let mut steps = made.change.steps.clone();
-            steps.push(next);
-            let former = made.change.clone();
-            self.take_back(made);
-            made = match self.try_steps(&steps) {
-                Some(grown) if grown.change.meshes() <= meshes => grown,
-                other => {
-                    failures += 1;
-                    other.into_iter().for_each(|grown| self.take_back(grown));
-                    let nodes = self.nodes.len();
-                    let undo = former.steps.iter().filter_map(|step| self.make(*step)).collect();
-                    Made { change: former, undo, nodes }
-                }
+            let Ok(made) = self.try_steps(&[next]) else {
+                failures += 1;
+                continue;
             };
+            let both = change.then(&made.change);
+            if both.meshes() <= meshes {
+                change = both;
+            } else {
+                failures += 1;
+                self.take_back(made);
+            }
         }
-        Some(made.change)
+        change
     }
 
     /// Whether a step changes anything.
@@ -245,6 +294,15 @@ impl LevelCover {
         }
     }
 
+    /// The step that splits a leaf as in this cover; `None` if it is not split here.
+    fn split_of(&self, leaf: LeafKey) -> Option<Step> {
+        let node = self.nodes[self.index_over(leaf)? as usize];
+        match node.state {
+            State::Split { first } if node.key == leaf => Some(self.split_step(first as usize)),
+            _ => None,
+        }
+    }
+
     /// The step that makes eight children, of which the first has this index.
     fn split_step(&self, first: usize) -> Step {
         let children = &self.nodes[first..first + 8];
@@ -267,8 +325,8 @@ impl LevelCover {
         }
     }
 
-    /// Makes steps, if the cover then fits. Otherwise the cover stays as it is.
-    fn try_steps(&mut self, steps: &[Step]) -> Option<Made> {
+    /// Makes steps, if the cover then fits. Otherwise the cover stays as it is, and the first misfit is returned.
+    fn try_steps(&mut self, steps: &[Step]) -> Result<Made, Misfit> {
         let regions: Vec<Region> = steps.iter().map(|step| step.key().region()).collect();
         let before = self.leaves_touching(&regions);
         let finer_of = |leaf, is_empty| if is_empty { FinerNeighbours::NONE } else { self.finer_neighbours(leaf) };
@@ -279,30 +337,79 @@ impl LevelCover {
         let mut change = LevelChange { steps: steps.into(), ..LevelChange::default() };
         change.added = after.iter().filter(|leaf| before.binary_search(leaf).is_err()).copied().collect();
         let coarsest = change.added.iter().map(|(leaf, _)| leaf.level).max().unwrap_or(0);
-        let mut fits = true;
-        for (leaf, is_empty) in &after {
-            let old = before.binary_search(&(*leaf, *is_empty)).ok();
-            if !fits || *is_empty {
-                continue;
-            }
+        let mut misfit = None;
+        for (leaf, _) in after.iter().filter(|(_, is_empty)| !is_empty) {
+            let old = before.binary_search(&(*leaf, false)).ok();
             // What was there before fits all but what is new.
-            if old.is_none() || leaf.level + 1 < coarsest {
-                fits = too_coarse(self, *leaf).is_none();
+            if (old.is_none() || leaf.level + 1 < coarsest)
+                && let Some(index) = too_coarse(self, *leaf)
+            {
+                misfit = Some(Misfit::TooCoarse(self.nodes[index as usize].key));
+                break;
             }
             let now = self.finer_neighbours(*leaf);
             if old.is_none_or(|old| finer[old] != now) {
-                fits = fits && now.alternating_edge().is_none();
+                if let Some(across) = now.alternating_edge() {
+                    misfit = Some(Misfit::Alternate([*leaf, neighbour(*leaf, across).unwrap_or(*leaf)]));
+                    break;
+                }
                 change.remeshed.extend(old.map(|_| *leaf));
             }
         }
         let gone = before.into_iter().filter(|leaf| after.binary_search(leaf).is_err());
         change.removed = gone.map(|(leaf, _)| leaf).collect();
         let made = Made { change, undo, nodes };
-        if fits {
-            return Some(made);
+        match misfit {
+            None => Ok(made),
+            Some(misfit) => {
+                self.take_back(made);
+                Err(misfit)
+            }
         }
-        self.take_back(made);
-        None
+    }
+
+    /// Makes a step, together with those without which leaves would alternate, at most so many. Otherwise, returns the
+    /// step that has to be made first, if there is one.
+    fn try_step(&mut self, step: Step, target: &Self, most: usize) -> Result<LevelChange, Option<Step>> {
+        let mut steps = vec![step];
+        loop {
+            let misfit = match self.try_steps(&steps) {
+                Ok(made) => return Ok(made.change),
+                Err(misfit) => misfit,
+            };
+            let is_new = |step: &Step| steps.iter().all(|other| other.key() != step.key());
+            let next = match misfit {
+                Misfit::TooCoarse(leaf) => {
+                    let is_there = self.leaf_at(leaf.region().min) == Some(leaf);
+                    if is_there {
+                        return Err(target.split_of(leaf));
+                    }
+                    // The steps themselves have made it.
+                    target.split_of(leaf).filter(is_new)
+                }
+                Misfit::Alternate(coarse) => {
+                    let split = coarse.into_iter().filter_map(|leaf| target.split_of(leaf)).find(is_new);
+                    split.or_else(|| self.merge_beside(coarse, target, is_new))
+                }
+            };
+            match next {
+                Some(next) if steps.len() < most => steps.push(next),
+                _ => return Err(None),
+            }
+        }
+    }
+
+    /// A merge in one of the finer places at an edge with two coarse leaves.
+    fn merge_beside(&self, coarse: [LeafKey; 2], target: &Self, is_new: impl Fn(&Step) -> bool) -> Option<Step> {
+        let [leaf, across] = coarse;
+        (0..3).filter(|&axis| leaf.position[axis] != across.position[axis]).find_map(|axis| {
+            let mut finer = leaf;
+            finer.position[axis] = across.position[axis];
+            let place = finer.region();
+            let is_inside = |key: LeafKey| key.level <= finer.level && place.contains(key.region().min);
+            let is_merge = |step: &Step| matches!(step, Step::Merge { .. }) && is_inside(step.key()) && is_new(step);
+            self.steps_to(target, Some(&place)).into_iter().find(is_merge)
+        })
     }
 
     /// Takes the latest steps back.
@@ -323,7 +430,7 @@ impl LevelCover {
         let whole = filled.iter().filter(|leaf| !refined.is_split(**leaf));
         let merges = whole.map(|&key| Step::Merge { key, is_empty: false });
         let splits = (self.nodes.len()..refined.nodes.len()).step_by(8).map(|first| refined.split_step(first));
-        Some(self.clone().try_steps(&merges.chain(splits).collect::<Vec<_>>())?.change)
+        Some(self.clone().try_steps(&merges.chain(splits).collect::<Vec<_>>()).ok()?.change)
     }
 
     /// All that is left on the way to another cover, as one change.
@@ -337,7 +444,7 @@ impl LevelCover {
             next.iter().for_each(|step| _ = cover.make(*step));
             steps.extend(next);
         }
-        Some(self.try_steps(&steps)?.change)
+        Some(self.try_steps(&steps).ok()?.change)
     }
 
     /// Makes one step, and says how to take it back; `None` if the cover has no such node.

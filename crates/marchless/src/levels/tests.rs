@@ -373,3 +373,24 @@ fn what_is_kept_needs_no_viewer() {
         assert!(EXTENT.points().all(|chunk| all.leaf_at(chunk).is_some()));
     }
 }
+
+/// On even ground between two rows of chunks, splits and merges wait for others across edges: none waits for all.
+#[test]
+fn wide_views_change_in_small_parts() {
+    let is_empty = |leaf: LeafKey| leaf.region().min[1] > 0 || leaf.region().max[1] < 0;
+    let settings = LevelSettings { levels: 5, falloff: 3.0, ..LevelSettings::default() };
+    let mut shown = LevelCover::new(&[], &settings, None, is_empty).expect("no leaves are not too many");
+    for x in [0.0, 90.0, 180.5, 180.0] {
+        let viewers = see(&[[x, 2.0, 0.0]], 64.0);
+        let target = LevelCover::new(&viewers, &settings, Some(&shown), is_empty).expect("few leaves");
+        let urgency = |leaf| distance_squared([x, 2.0, 0.0], leaf) as u32;
+        let (changes, is_whole) = shown.first_changes_to(&target, usize::MAX, 24, urgency).expect("the same levels");
+        assert!(is_whole);
+        for change in &changes {
+            let meshes = change.added.iter().filter(|(_, is_empty)| !is_empty).count() + change.remeshed.len();
+            assert!(meshes <= 48, "{meshes} meshes");
+            shown.apply(change);
+        }
+        assert!(shown.leaves().eq(target.leaves()));
+    }
+}

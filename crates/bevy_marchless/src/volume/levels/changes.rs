@@ -34,9 +34,10 @@ impl Heart {
 
     /// Requests the samples of chunks of the finest level and of those around them.
     fn load_around(&mut self, positions: &[[i32; 3]]) {
+        let Some(extent) = self.extent() else { return };
         let Self { table, arriving, cover, .. } = self;
         for near in positions.iter().flat_map(|position| ChunkKey::finest(*position).around()) {
-            if !table.contains(near) {
+            if extent.contains(near.position) && !table.contains(near) {
                 arriving.add(near, cover);
             }
         }
