@@ -34,14 +34,14 @@ impl Sight {
         }
     }
 
-    fn viewer(self) -> TerrainViewer {
+    pub(crate) fn viewer(self) -> TerrainViewer {
         TerrainViewer::new(match self {
             Self::Near => 256.0,
             Self::Far => 4_096.0,
         })
     }
 
-    fn terrain(self, world: World) -> Terrain {
+    pub(crate) fn terrain(self, world: World) -> Terrain {
         match self {
             Self::Near => world.terrain(),
             Self::Far => world.terrain().with_levels(6),
@@ -59,6 +59,8 @@ pub(crate) struct Flight {
     pub(crate) close: Vec<u32>,
     /// The most leaves in range that were pending at once, except after teleports.
     pub(crate) waiting: usize,
+    /// Updates until everything in range was drawn after the end of the flight.
+    pub(crate) stopped: u32,
     /// The work done after the first view was complete.
     pub(crate) stats: TerrainStats,
     /// The time that this work took.
@@ -79,14 +81,6 @@ impl Flight {
         if paced {
             let (times, _) = game.settle(20 * PACE);
             complete.push(times.count() as u32);
-            eprintln!(
-                "FIRST meshed {} filled {} drawn {:?} mesh_time {:?} fill_time {:?}",
-                stats(&game).meshed,
-                stats(&game).filled,
-                game.volume().coverage(),
-                stats(&game).mesh_time,
-                stats(&game).fill_time
-            );
         }
         let (before, start) = (stats(&game), Instant::now());
         let (mut times, mut waiting, mut waits_since, mut close_since) = (Vec::new(), 0, None, None);
@@ -119,6 +113,7 @@ impl Flight {
         }
         complete.extend(waits_since.map(|since| updates - since));
         let (stats, time) = (since(&stats(&game), &before), start.elapsed());
+        let stopped = if paced { game.settle(20 * PACE).0.count() as u32 } else { 0 };
         // Memory is measured bit by bit.
         for _ in 0..1_000 {
             game.app.update();
@@ -132,6 +127,7 @@ impl Flight {
             complete,
             close,
             waiting,
+            stopped,
             stats,
             time,
             resident: diagnostic(&TerrainDiagnosticsPlugin::RESIDENT_BYTES),

@@ -11,8 +11,10 @@ use super::Surfaces;
 
 /// The most changes that are planned at once.
 const MOST: usize = 96;
-/// The most meshes of a change, as far as that can be.
+/// The most meshes of a change, as far as that can be; and where nothing is drawn yet, so that leaves are meshed less
+/// often.
 const MESHES: usize = 24;
+const MESHES_AT_FIRST: usize = 96;
 
 /// A job that computes a plan.
 pub(crate) struct PlanJob {
@@ -71,8 +73,14 @@ impl PlanJob {
         let mut from = LevelCover::clone(shown);
         running.iter().for_each(|(_, change)| from.apply(change));
         let target = LevelCover::new(viewers, settings, former.as_deref(), |leaf| surfaces.is_empty(leaf))?;
+        let meshes = if from.leaves().next().is_none() { MESHES_AT_FIRST } else { MESHES };
+        let far = 64.0 * settings.falloff;
+        let of = |leaf: LeafKey| {
+            let urgency = urgency(viewers, leaf);
+            if target.is_split(leaf) { urgency } else { urgency_of_merge(urgency, far) }
+        };
         // Both have the same number of levels.
-        let first = from.first_changes_to(&target, MOST, MESHES, |leaf| urgency(viewers, leaf));
+        let first = from.first_changes_to(&target, MOST, meshes, of);
         let (changes, is_whole) = first.unwrap_or_default();
         let mut plan =
             Plan { left: changes.len(), is_part: !is_whole, target: Some(Arc::new(target)), ..Plan::default() };
@@ -94,6 +102,8 @@ impl PlanJob {
             }
             let leaves = change.added.iter().map(|(leaf, _)| *leaf).chain(change.removed.iter().copied());
             let urgency = leaves.map(|leaf| urgency(viewers, leaf)).min().unwrap_or(0);
+            let is_merge = change.removed.len() > change.added.len();
+            let urgency = if is_merge { urgency_of_merge(urgency, far) } else { urgency };
             if waits == 0 {
                 plan.ready.push(Reverse((urgency, index)));
             }
@@ -184,6 +194,12 @@ fn urgency(viewers: &[LevelViewer], leaf: LeafKey) -> u32 {
     };
     let nearest = viewers.iter().map(distance).fold(f64::INFINITY, f64::min).sqrt();
     (64.0 * nearest / width) as u32
+}
+
+/// The urgency of a merge: the farther behind viewers, the longer it is due. But what is near them comes first. `far`:
+/// the urgency at which leaves are split.
+fn urgency_of_merge(urgency: u32, far: f64) -> u32 {
+    (far * far / f64::from(urgency).max(1.0)).clamp(0.67 * far, far) as u32
 }
 
 /// A change under way, or one that is planned.
