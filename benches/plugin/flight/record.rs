@@ -22,8 +22,9 @@ fn text(flights: &[(String, Flight)], edits: &[FarEdits]) -> String {
          thread: CPU time of the plugin's systems and their commands in an update. Complete: updates until all in range \
          was drawn, for the first view and after each teleport. Close: the same for all within 128 voxels. Waiting: the \
          most chunks in range that were not drawn yet in an update, teleports left out. Stopped: updates after the flight \
-         until all in range was drawn. Meshed: chunks a second. Empty: how many of the chunks that were sampled had no surface. Per chunk: main thread \
-         and meshing, without sampling, for each chunk meshed; meshing is measured on the wall.\n\n{}\n{}\n\
+         until all in range was drawn. Meshed: chunks a second. Empty: how many of the chunks that were sampled had no \
+         surface. Per chunk: main thread and meshing, without sampling, for each chunk meshed; meshing is measured on \
+         the wall.\n\n{}\n{}\n\
          Digs into hills seen 4,096 voxels far: the time of the update that reads the stamp, and how many updates later \
          the hole is there.\n\n{}",
         processor(),

@@ -63,6 +63,10 @@ impl Plugin for MeshingPlugin {
 /// [`MarchlessSettings::max_inline_chunks`] is higher.
 const MOST_INLINE: usize = 1024;
 
+/// The least number of changes of levels that one update begins to mesh, so that jobs do not wait for those that are
+/// shown.
+const MIN_CHANGES: usize = 4;
+
 /// The system parameters that spawning and updating chunk entities need.
 #[derive(SystemParam)]
 struct MeshPresenter<'w, 's> {
@@ -164,7 +168,7 @@ struct MeshUpdate<'a, 'w, 's> {
     /// The chunks that may still be meshed within this update.
     inline_left: usize,
     max_upload_bytes: usize,
-    /// The bytes of all meshes taken from jobs in this update.
+    /// The bytes of all meshes shown in this update.
     bytes: usize,
     /// The time spent on edits, which does not count against the budget of other work.
     edits: Duration,
@@ -205,8 +209,9 @@ impl MeshUpdate<'_, '_, '_> {
             let stats = &mut self.presenter.stats;
             // New chunks may come one by one; an edit is shown as a whole.
             let may_take_more = || bytes.get() == 0 || bytes.get() <= max_upload_bytes && Instant::now() < until;
-            let note = |meshed: &ChunkMesh| {
-                bytes.set(bytes.get() + geometry_bytes(&meshed.geometry).max(1));
+            let note = |meshed: &ChunkMesh, is_shown: bool| {
+                let size = if is_shown { geometry_bytes(&meshed.geometry).max(1) } else { 0 };
+                bytes.set(bytes.get() + size);
                 if !meshed.time.is_zero() {
                     stats.count_mesh(meshed.time);
                 }
@@ -234,8 +239,11 @@ impl MeshUpdate<'_, '_, '_> {
             at_once.iter().for_each(|meshed| self.presenter.stats.count_mesh(meshed.time));
             drop(inputs);
             let shown = terrain.heart.show_level_change(change, at_once);
+            self.bytes += shown.swaps.iter().map(|swap| geometry_bytes(&swap.meshed.geometry)).sum::<usize>();
             if !urgent {
-                let entities = (shown.swaps.len() + terrain.heart.table().released_len()) as u32;
+                let is_shown = |swap: &&Swap| !matches!(swap.place, ShowTarget::Nowhere);
+                let shown_len = shown.swaps.iter().filter(is_shown).count();
+                let entities = (shown_len + terrain.heart.table().released_len()) as u32;
                 self.until = self.until.checked_sub(ENTITY_TIME * entities).unwrap_or(self.until);
             }
             self.show(terrain, shown);
@@ -250,7 +258,7 @@ impl MeshUpdate<'_, '_, '_> {
     fn start_level_changes(&mut self, terrain: &mut MeshedTerrain) {
         terrain.heart.start_level_changes();
         let mut done = 0;
-        while (done == 0 || Instant::now() < self.until)
+        while (done < MIN_CHANGES || Instant::now() < self.until)
             && let Some(jobs) = terrain.heart.next_level_jobs(self.in_flight)
         {
             let (change, attempt) = (jobs.change, jobs.attempt());

@@ -2,10 +2,12 @@
 
 use core::any::Any;
 
-use alloc::boxed::Box;
-use alloc::sync::Arc;
+use alloc::{boxed::Box, sync::Arc, vec::Vec};
 
-use crate::lattice::{Shape, ShapeError};
+use crate::{
+    lattice::{Shape, ShapeError},
+    sample::Weight as _,
+};
 
 /// The margin, in points, that must be bounded around a region before it may stay unsampled. Brushes and isovalues
 /// reach four voxels from the surface.
@@ -112,6 +114,20 @@ pub trait Source: Any + Send + Sync {
     /// divided by [`SourceRegion::spacing`]); NaN counts as outside. `materials`: the same shape, all 0 when called.
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]);
 
+    /// The same in weights: distances in voxels of level 0, at every level, rounded as [`Weight::from_voxels`] does.
+    /// [`LeafBlock`](crate::LeafBlock) calls it. A source that has such weights at hand may answer with them.
+    ///
+    /// `distances`: scratch memory.
+    fn fill_weights(&self, region: &SourceRegion, distances: &mut Vec<f32>, weights: &mut [i16], materials: &mut [u8]) {
+        let width = (0..region.level).fold(1.0, |width: f32, _| 2.0 * width);
+        distances.clear();
+        distances.resize(weights.len(), 0.0);
+        self.fill(region, distances, materials);
+        for (weight, distance) in weights.iter_mut().zip(&*distances) {
+            *weight = i16::from_voxels(distance * width);
+        }
+    }
+
     /// A quick bound of all points of `region`, at its level. Any answer but [`Bound::Mixed`] spares sampling them, so
     /// this pays off if it costs less than a few samples. A wrong answer leaves holes. The default is [`Bound::Mixed`].
     fn bound(&self, region: &SourceRegion) -> Bound {
@@ -154,6 +170,16 @@ macro_rules! forward {
         impl Source for $pointer {
             fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
                 (**self).fill(region, distances, materials);
+            }
+
+            fn fill_weights(
+                &self,
+                region: &SourceRegion,
+                distances: &mut Vec<f32>,
+                weights: &mut [i16],
+                materials: &mut [u8],
+            ) {
+                (**self).fill_weights(region, distances, weights, materials);
             }
 
             fn bound(&self, region: &SourceRegion) -> Bound {

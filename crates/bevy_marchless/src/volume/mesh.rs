@@ -193,21 +193,22 @@ impl Heart {
     }
 
     /// Takes results of meshing jobs, and returns the groups that are complete. Results of groups that give way are
-    /// taken while `may_take_more` says so; results of edits always.
+    /// taken while `may_take_more` says so; results of edits always. `note` gets each result, and whether it is shown soon:
+    /// those of changes of levels wait for each other.
     pub(crate) fn take_meshed(
         &mut self,
         mut may_take_more: impl FnMut() -> bool,
-        mut note: impl FnMut(&ChunkMesh),
+        mut note: impl FnMut(&ChunkMesh, bool),
     ) -> Option<Group> {
         self.deferred_meshes.extend(self.mesh_results.take());
         for _ in 0..self.deferred_meshes.len() {
             match self.deferred_meshes.pop_front()? {
                 MeshResult::Restyled(restyled) => {
-                    note(&restyled.meshed);
+                    note(&restyled.meshed, true);
                     self.take_restyled(restyled);
                 }
                 MeshResult::OfLevels(mesh) => {
-                    note(&mesh.meshed);
+                    note(&mesh.meshed, false);
                     self.take_level_mesh(mesh);
                 }
                 MeshResult::OfGroup(id, meshed) => {
@@ -216,7 +217,7 @@ impl Heart {
                         self.deferred_meshes.push_back(MeshResult::OfGroup(id, meshed));
                         continue;
                     }
-                    note(&meshed);
+                    note(&meshed, true);
                     group.meshed.push(meshed);
                     if group.meshed.len() == group.members {
                         return self.groups.remove(id);

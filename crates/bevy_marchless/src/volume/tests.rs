@@ -235,7 +235,7 @@ impl Game {
     }
 
     fn mesh(&mut self, inline: usize, until: Instant) {
-        while let Some(group) = self.heart.take_meshed(|| Instant::now() < until, |_| {}) {
+        while let Some(group) = self.heart.take_meshed(|| Instant::now() < until, |_, _| {}) {
             let shown = self.heart.show(group);
             self.show(shown);
         }

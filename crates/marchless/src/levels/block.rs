@@ -276,16 +276,13 @@ impl Filler<'_> {
 
     /// Fills a box with the source's own samples of a level.
     fn sample(&mut self, level: u8, min: [i32; 3], size: [u32; 3], out: &mut SampleBox) {
-        let (width, len) = (f32::from(1u8 << level), size.iter().map(|&v| v as usize).product());
-        let region = SourceRegion { min, size, level, spacing: self.from.spacing * f64::from(width) };
-        self.distances.clear();
-        self.distances.resize(len, 0.0);
+        let len = size.iter().map(|&v| v as usize).product();
+        let region = SourceRegion { min, size, level, spacing: self.from.spacing * f64::from(1u8 << level) };
         out.size = size;
         out.materials.clear();
         out.materials.resize(len, 0);
-        self.from.source.fill(&region, self.distances, &mut out.materials);
-        out.weights.clear();
-        out.weights.extend(self.distances.iter().map(|distance| i16::from_voxels(distance * width)));
+        out.weights.resize(len, 0);
+        self.from.source.fill_weights(&region, self.distances, &mut out.weights, &mut out.materials);
         self.apply_edits(&region, out);
         if let Some(planes) = self.from.planes {
             let (weights, materials) = (&mut out.weights, &mut out.materials);

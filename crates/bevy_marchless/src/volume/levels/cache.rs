@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_platform::collections::HashMap;
-use marchless::{Bound, Source, SourceRegion, Weight as _};
+use marchless::{Bound, Source, SourceRegion};
 
 /// The most samples that are remembered: about 130 MB, the leaves of a view.
 const MOST_SAMPLES: usize = 40 << 20;
@@ -32,7 +32,7 @@ struct Cache {
 type Place = (u8, [i32; 3], [u32; 3]);
 
 struct Answer {
-    /// Distances in voxels of level 0, as blocks have them, and materials.
+    /// Weights, as blocks have them, and materials.
     samples: Arc<(Vec<i16>, Vec<u8>)>,
     last_used: u64,
 }
@@ -54,23 +54,22 @@ impl CachedSource {
 
 impl Source for CachedSource {
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]) {
-        if distances.len() < FEWEST_SAMPLES {
-            return self.source.fill(region, distances, materials);
-        }
+        self.source.fill(region, distances, materials);
+    }
+
+    fn fill_weights(&self, region: &SourceRegion, distances: &mut Vec<f32>, weights: &mut [i16], materials: &mut [u8]) {
         let place = (region.level, region.min, region.size);
-        let width = f32::from(1u8 << region.level);
-        let known = self.lock().find(place);
+        let is_large = weights.len() >= FEWEST_SAMPLES;
+        let known = if is_large { self.lock().find(place) } else { None };
         if let Some(known) = known {
-            let (weights, known_materials) = &*known;
-            for (distance, weight) in distances.iter_mut().zip(weights) {
-                *distance = weight.to_voxels() / width;
-            }
-            materials.copy_from_slice(known_materials);
+            weights.copy_from_slice(&known.0);
+            materials.copy_from_slice(&known.1);
             return;
         }
-        self.source.fill(region, distances, materials);
-        let weights = distances.iter().map(|distance| i16::from_voxels(distance * width)).collect();
-        self.lock().insert(place, (weights, materials.to_vec()));
+        self.source.fill_weights(region, distances, weights, materials);
+        if is_large {
+            self.lock().insert(place, (weights.to_vec(), materials.to_vec()));
+        }
     }
 
     fn bound(&self, region: &SourceRegion) -> Bound {
@@ -136,10 +135,9 @@ mod tests {
         let ask = |level: u8, x: i32, size: u32| {
             let region = SourceRegion { min: [x, 0, 0], size: [size; 3], level, spacing: f64::from(1 << level) };
             let len = (size * size * size) as usize;
-            let (mut distances, mut materials) = (vec![0.0; len], vec![0; len]);
-            source.fill(&region, &mut distances, &mut materials);
-            let width = f32::from(1u8 << level);
-            (distances.into_iter().map(|d| i16::from_voxels(d * width)).collect::<Vec<_>>(), materials)
+            let (mut weights, mut materials) = (vec![0; len], vec![0; len]);
+            source.fill_weights(&region, &mut Vec::new(), &mut weights, &mut materials);
+            (weights, materials)
         };
         for (level, x) in [(0, 0), (3, 0), (3, 5), (6, -1)] {
             assert_eq!(ask(level, x, 16), ask(level, x, 16));
