@@ -123,13 +123,13 @@ impl ActiveCells {
 
 /// The bits of the active cells. Bit `x` of `corners[k]` is corner `k` of cell `x`.
 #[inline(always)]
-const fn active_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
+pub(crate) const fn active_cells([a, b, c, d, e, f, g, h]: [u64; 8]) -> u64 {
     (a | b | c | d | e | f | g | h) & !(a & b & c & d & e & f & g & h)
 }
 
 /// The signs of the eight corners of `count` words of cells from word `start` on.
 #[inline(always)]
-fn corner_words<'a>(
+pub(crate) fn corner_words<'a>(
     low: &'a SlabSigns,
     high: &'a SlabSigns,
     start: usize,

@@ -13,7 +13,8 @@ pub struct MeshBuffer {
     /// One unit normal per vertex, pointing outside; empty if the settings turn normals off.
     pub normals: Vec<[f32; 3]>,
     /// One material per vertex: that of the inside end of its edge, or of the nearest inside corner for a vertex in the
-    /// interior of a cell. Empty if the samples have no materials.
+    /// interior of a cell (in a dual mesh, of those at its crossings, before smoothing). Empty if the samples have no
+    /// materials.
     pub materials: Vec<u8>,
     /// Three vertex indices per triangle.
     pub indices: Vec<u32>,

@@ -155,7 +155,7 @@ impl Loops {
 }
 
 /// The crossed edge that follows each crossed edge on its loop.
-const fn next_crossings(case: CaseIndex, joined: u8) -> [Option<Edge>; 12] {
+pub(crate) const fn next_crossings(case: CaseIndex, joined: u8) -> [Option<Edge>; 12] {
     let (mut next, mut face) = ([None; 12], 0);
     while face < 6 {
         let corners = Face::ALL[face].corners();

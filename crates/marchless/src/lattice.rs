@@ -212,7 +212,7 @@ impl<'a, W> Samples<'a, W> {
     /// Makes the outermost layer of samples padding: gradients read it, but its cells are not meshed.
     ///
     /// Positions are then relative to the sample at `[1, 1, 1]`. Two blocks that overlap in their padding agree on
-    /// their shared border bit for bit.
+    /// their shared border bit for bit. [`Mesher::mesh_dual`](crate::Mesher::mesh_dual) takes more layers as padding.
     #[must_use]
     pub const fn padded(self) -> Self {
         Self { padded: true, ..self }

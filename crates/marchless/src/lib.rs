@@ -20,7 +20,8 @@
 //! # From samples to a mesh
 //! [`Mesher`] meshes any borrowed [`Samples`] into a reusable [`MeshBuffer`]. [`SlabMesher`] meshes a volume that
 //! arrives slab by slab and need not fit in memory. `ThreadedMesher` (feature `std`) meshes a large volume on several
-//! threads. All three give the same mesh. [`Grid`] keeps a whole volume in chunks, which mesh one by one without seams:
+//! threads. All three give the same mesh. [`Mesher::mesh_dual`] makes another: one vertex in each cell, fewer slivers,
+//! and smoothing. [`Grid`] keeps a whole volume in chunks, which mesh one by one without seams:
 //!
 //! ```
 //! use marchless::{Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Operation, QuantisedShape, QuantisedStamp, Region};
@@ -136,7 +137,9 @@ pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 pub use levels::{LeafBlock, LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelSource, LevelViewer};
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
-pub use mesher::{FinerNeighbours, LeafError, LeafSamples, MeshError, MeshSettings, Mesher, SlabMesher, Topology};
+pub use mesher::{
+    DualSettings, FinerNeighbours, LeafError, LeafSamples, MeshError, MeshSettings, Mesher, SlabMesher, Topology,
+};
 pub use query::RayHit;
 pub use sample::{Voxel, Weight};
 pub use simd::Backend;

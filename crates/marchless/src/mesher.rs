@@ -6,8 +6,8 @@
 //!                                          └─4 triangles─▶ one visit per active cell between two slabs
 //! ```
 //!
-//! All meshers share [`signs`](crate::signs) and [`active`](crate::active). The marching-cubes passes (`primal`) build
-//! on them. For [`Topology::Trilinear`], `trilinear` decides ambiguous cells by their weights. The passes work on one
+//! All meshers share [`signs`](crate::signs) and [`active`](crate::active). The marching-cubes passes (`primal`) and
+//! the dual mesher (`dual`) build on them. For [`Topology::Trilinear`], `trilinear` decides ambiguous cells by their weights. The passes work on one
 //! slab of samples after the other, while it is in the cache (`pipeline`).
 //!
 //! Vertices are numbered slab by slab: first those on edges along z from the slab below, then those in the interior of
@@ -18,7 +18,9 @@
 //! counters that run through a whole slab replace its offsets per row.
 
 mod crossing;
+mod dual;
 mod error;
+mod gather;
 mod job;
 mod normal;
 mod output;
@@ -33,6 +35,8 @@ mod trilinear;
 
 use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, simd::Backend};
 pub(crate) use crossing::{crossing_fraction, snapped};
+use dual::DualPipeline;
+pub use dual::DualSettings;
 pub use error::MeshError;
 use error::checked_layout;
 use job::{Input, MeshJob};
@@ -79,17 +83,22 @@ pub struct Mesher {
     backend: Option<Backend>,
     pipeline: SlabPipeline,
     transitions: Transitions,
+    dual: DualPipeline,
 }
 
 impl Mesher {
     /// A mesher that uses the [fastest](Backend::fastest) backend. It allocates nothing until the first mesh.
     pub const fn new() -> Self {
-        Self { backend: None, pipeline: SlabPipeline::new(), transitions: Transitions::new() }
+        Self::of(None)
     }
 
     /// A mesher that uses `backend`, or the portable one if that is not [available](Backend::is_available).
     pub const fn with_backend(backend: Backend) -> Self {
-        Self { backend: Some(backend), pipeline: SlabPipeline::new(), transitions: Transitions::new() }
+        Self::of(Some(backend))
+    }
+
+    const fn of(backend: Option<Backend>) -> Self {
+        Self { backend, pipeline: SlabPipeline::new(), transitions: Transitions::new(), dual: DualPipeline::new() }
     }
 
     /// Meshes `samples` into `out` and drops its former content. Samples without a surface are no error: `out` is then

@@ -16,19 +16,19 @@ pub(crate) use window::{EdgeSlabs, Window};
 
 use crate::{sample::Weight, simd::Simd};
 
-/// The signs of three neighbouring slabs. They move up through a volume, one slab at a time.
+/// The signs of three or more neighbouring slabs. They move up through a volume, one slab at a time.
 ///
-/// The slabs are the one below, the current one and the next one. The next one is read early and in one go: gradients
-/// read single samples of it and then find them in the cache. (Refused: reading it only for gradients; caves of 256³
-/// `f32` samples then took 67 instead of 41 ms.)
+/// The last slabs are the one below, the current one and the next one; farther ones below come first. The next one is
+/// read early and in one go: gradients read single samples of it and then find them in the cache. (Refused: reading it
+/// only for gradients; caves of 256³ `f32` samples then took 67 instead of 41 ms.)
 #[derive(Clone, Debug)]
-pub(crate) struct SignSweep {
-    slabs: [SlabSigns; 3],
+pub(crate) struct SignSweep<const SLABS: usize = 3> {
+    slabs: [SlabSigns; SLABS],
 }
 
-impl SignSweep {
+impl<const SLABS: usize> SignSweep<SLABS> {
     pub(crate) const fn new() -> Self {
-        Self { slabs: [SlabSigns::new(), SlabSigns::new(), SlabSigns::new()] }
+        Self { slabs: [const { SlabSigns::new() }; SLABS] }
     }
 
     /// Moves up by one slab. `first`: the current slab, if the sweep starts with it. `next`: the slab above, if there
@@ -42,7 +42,7 @@ impl SignSweep {
         threshold: W::Threshold,
     ) {
         self.slabs.rotate_left(1);
-        let [_, current, above] = &mut self.slabs;
+        let [.., current, above] = &mut self.slabs[..] else { unreachable!("there are three slabs or more") };
         if let Some(first) = first {
             current.fill::<S, W>(layout, first, threshold);
         }
@@ -55,7 +55,7 @@ impl SignSweep {
     /// equal.
     #[inline(always)]
     pub(crate) fn write_out_pair(&mut self, layout: &SlabLayout) -> bool {
-        let [below, current, _] = &mut self.slabs;
+        let [.., below, current, _] = &mut self.slabs[..] else { unreachable!("there are three slabs or more") };
         if below.uniform().is_some() && below.uniform() == current.uniform() {
             return false;
         }
@@ -67,13 +67,19 @@ impl SignSweep {
     /// The signs of the slab below and of the current slab.
     #[inline(always)]
     pub(crate) const fn pair(&self) -> [&SlabSigns; 2] {
-        [&self.slabs[0], &self.slabs[1]]
+        [&self.slabs[SLABS - 3], &self.slabs[SLABS - 2]]
+    }
+
+    /// The signs of all slabs, the lowest first.
+    #[inline(always)]
+    pub(crate) const fn all(&self) -> &[SlabSigns; SLABS] {
+        &self.slabs
     }
 
     /// The signs of the current slab, unless all of them are equal.
     #[inline(always)]
     pub(crate) fn current_mixed(&self) -> Option<&SlabSigns> {
-        self.slabs[1].uniform().is_none().then_some(&self.slabs[1])
+        self.slabs[SLABS - 2].uniform().is_none().then_some(&self.slabs[SLABS - 2])
     }
 }
 

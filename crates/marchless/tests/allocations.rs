@@ -7,7 +7,9 @@ use core::{
 use std::alloc::System;
 
 use fastrand::Rng;
-use marchless::{Block, Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight};
+use marchless::{
+    Block, DualSettings, Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight,
+};
 
 thread_local! {
     /// The number of allocations by this thread. Counted per thread, since the test harness has threads of its own.
@@ -70,6 +72,20 @@ fn mesh_all<W: Weight>(fields: &[(Shape, Vec<W>, Vec<u8>)], mesher: &mut Mesher,
     }
 }
 
+fn mesh_all_dual<W: Weight>(fields: &[(Shape, Vec<W>, Vec<u8>)], mesher: &mut Mesher, out: &mut MeshBuffer) {
+    for (shape, weights, materials) in fields {
+        let plain = Samples::new(*shape, weights).expect("one weight a sample");
+        let with_materials = plain.with_materials(materials).expect("one material a sample");
+        for samples in [plain, with_materials, with_materials.padded()] {
+            for smoothing in [0, 1] {
+                let settings = DualSettings { isovalue: 0.25, smoothing, ..DualSettings::default() };
+                mesher.mesh_dual(samples, &settings, out).expect("the shapes are large enough");
+                assert!(!out.is_empty());
+            }
+        }
+    }
+}
+
 fn warm_meshing_allocates_nothing<W: Weight>() {
     let shapes = [[35, 35, 35], [130, 9, 12], [12, 40, 7]].map(|size| Shape::new(size).expect("the sizes are small"));
     let fields: Vec<_> = shapes
@@ -79,6 +95,11 @@ fn warm_meshing_allocates_nothing<W: Weight>() {
     let (mut mesher, mut out) = (Mesher::new(), MeshBuffer::new());
     assert_ne!(allocations(|| mesh_all(&fields, &mut mesher, &mut out)), 0, "cold buffers must grow");
     assert_eq!(allocations(|| mesh_all(&fields, &mut mesher, &mut out)), 0);
+
+    let fields: Vec<_> = fields.into_iter().filter(|(shape, ..)| shape.size().iter().all(|&size| size >= 9)).collect();
+    let (mut mesher, mut out) = (Mesher::new(), MeshBuffer::new());
+    assert_ne!(allocations(|| mesh_all_dual(&fields, &mut mesher, &mut out)), 0, "cold buffers must grow");
+    assert_eq!(allocations(|| mesh_all_dual(&fields, &mut mesher, &mut out)), 0);
 }
 
 #[test]

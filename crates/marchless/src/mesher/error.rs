@@ -22,7 +22,8 @@ pub enum MeshError {
     TooSmall {
         /// The shape that was given.
         shape: Shape,
-        /// The samples per axis that one cell needs: 2, or 4 if the outermost layer is padding.
+        /// The samples per axis that one cell needs: 2, or 4 if the outermost layer is padding. The dual
+        /// mesher needs 2, or the padding on both sides and one more.
         least: u32,
     },
     /// Slabs have no cells, or do not fit in memory.
@@ -50,6 +51,15 @@ pub enum MeshError {
     /// A leaf with finer neighbours is meshed with another topology than [`Topology::Separated`](crate::Topology).
     #[error("a leaf with finer neighbours can be meshed with Topology::Separated only")]
     LeafTopology,
+    /// There are more steps of smoothing than 8, or than a padded block has samples for: with `k` steps, it needs
+    /// `2 + k` samples per axis that are not padding.
+    #[error("at most {most} steps of smoothing are possible here, but there are {found}")]
+    Smoothing {
+        /// The steps that were given.
+        found: u32,
+        /// The most steps for these samples.
+        most: u32,
+    },
     /// `u32` indices cannot number all vertices.
     #[error("the surface has at least {found} vertices, more than 32-bit indices can name")]
     TooManyVertices {

@@ -4,6 +4,7 @@ use super::crossing::interpolated;
 use crate::{
     math::{sqrt, sqrt_f64},
     sample::{Weight, is_sound},
+    signs::SlabLayout,
 };
 
 /// The neighbours of one end of an edge, from which its gradient is computed.
@@ -17,13 +18,30 @@ pub(super) struct EndNeighbours<W> {
 }
 
 impl<W: Weight> EndNeighbours<W> {
+    /// The neighbours of the sample at `x`, `y`. `slabs`: the one below it, its own, and the one above. `one_sided`:
+    /// whether the gradient along z is.
+    pub(super) fn of(slabs: [&[W]; 3], one_sided: bool, layout: &SlabLayout, x: u32, y: u32) -> Self {
+        let [below, slab, above] = slabs;
+        let index = layout.index(x, y);
+        let first = [!layout.padded && x == 0, !layout.padded && y == 0];
+        let last =
+            [!layout.padded && x as usize + 1 == layout.size[0], !layout.padded && y as usize + 1 == layout.size[1]];
+        let low = [index - usize::from(!first[0]), index - if first[1] { 0 } else { layout.stride }];
+        let high = [index + usize::from(!last[0]), index + if last[1] { 0 } else { layout.stride }];
+        Self {
+            low: [slab[low[0]], slab[low[1]], below[index]],
+            high: [slab[high[0]], slab[high[1]], above[index]],
+            one_sided: [first[0] | last[0], first[1] | last[1], one_sided],
+        }
+    }
+
     /// Twice the gradient.
-    fn gradient(&self) -> [W::Wide; 3] {
+    pub(super) fn gradient(&self) -> [W::Wide; 3] {
         self.differences(|high, low| W::difference(high, low), W::doubled)
     }
 
     /// Twice the gradient, in `f64` and of finite weights: differences cannot overflow.
-    fn steady_gradient(&self) -> [f64; 3] {
+    pub(super) fn steady_gradient(&self) -> [f64; 3] {
         self.differences(|high, low| high.finite() - low.finite(), |difference| difference * 2.0)
     }
 
@@ -47,12 +65,13 @@ pub(super) fn vertex_normal<W: Weight>(
     unit(gradient).unwrap_or_else(|| {
         let mut fallback = [0.0; 3];
         fallback[axis] = if low_inside { 1.0 } else { -1.0 };
-        steady_unit(ends.each_ref().map(EndNeighbours::steady_gradient), fraction, fallback)
+        let [a, b] = ends.each_ref().map(EndNeighbours::steady_gradient);
+        steady_unit([0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * f64::from(fraction)), fallback)
     })
 }
 
 /// The direction of `gradient`; `None` if `f32` cannot compute its length well.
-fn unit(gradient: [f32; 3]) -> Option<[f32; 3]> {
+pub(super) fn unit(gradient: [f32; 3]) -> Option<[f32; 3]> {
     let [x, y, z] = gradient;
     let squared = x * x + y * y + z * z;
     let scale = 1.0 / sqrt(squared);
@@ -60,8 +79,7 @@ fn unit(gradient: [f32; 3]) -> Option<[f32; 3]> {
 }
 
 /// The direction of a gradient whose length is out of `f32`'s range; `fallback` if it is zero.
-fn steady_unit([a, b]: [[f64; 3]; 2], fraction: f32, fallback: [f32; 3]) -> [f32; 3] {
-    let gradient = [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * f64::from(fraction));
+pub(super) fn steady_unit(gradient: [f64; 3], fallback: [f32; 3]) -> [f32; 3] {
     let largest = gradient.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
     if largest == 0.0 {
         return fallback;

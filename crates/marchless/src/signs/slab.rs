@@ -39,6 +39,11 @@ impl SlabSigns {
         &self.next
     }
 
+    /// The sign of one sample, of a uniform slab too: true is inside.
+    pub(crate) fn is_inside(&self, layout: &SlabLayout, x: usize, y: usize) -> bool {
+        self.uniform.unwrap_or_else(|| self.signs[y * layout.words + x / 64] >> (x % 64) & 1 == 1)
+    }
+
     /// Reads all samples of a slab, padding included.
     #[inline(always)]
     pub(super) fn fill<S: Simd, W: Weight>(&mut self, layout: &SlabLayout, slab: &[W], threshold: W::Threshold) {

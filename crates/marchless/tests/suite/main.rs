@@ -12,6 +12,7 @@ mod bits_regions;
 mod cases;
 mod chunks;
 mod crossings;
+mod dual;
 mod exhaustive;
 mod extraction;
 mod levels;

@@ -35,27 +35,11 @@ pub(super) fn mend<const AXIS: usize, W: Weight>(
         bounds.include(position);
         if settings.normals {
             let ends = [
-                end([below, low, next_to_low], edges.one_sided[0], layout, x, y),
-                end([next_to_high, high, above], edges.one_sided[1], layout, x_high, y_high),
+                EndNeighbours::of([below, low, next_to_low], edges.one_sided[0], layout, x, y),
+                EndNeighbours::of([next_to_high, high, above], edges.one_sided[1], layout, x_high, y_high),
             ];
             let normal = vertex_normal(&ends, AXIS, fraction, a.inside(W::threshold(settings.isovalue)));
             out.normals.spare_capacity_mut()[vertex].write(normal);
         }
-    }
-}
-
-/// The neighbours of the end of an edge at `x`, `y`. `slabs`: the one below the end, its own, and the one above.
-/// `one_sided`: whether the gradient along z is.
-fn end<W: Weight>(slabs: [&[W]; 3], one_sided: bool, layout: &SlabLayout, x: u32, y: u32) -> EndNeighbours<W> {
-    let [below, slab, above] = slabs;
-    let index = layout.index(x, y);
-    let first = [!layout.padded && x == 0, !layout.padded && y == 0];
-    let last = [!layout.padded && x as usize + 1 == layout.size[0], !layout.padded && y as usize + 1 == layout.size[1]];
-    let low = [index - usize::from(!first[0]), index - if first[1] { 0 } else { layout.stride }];
-    let high = [index + usize::from(!last[0]), index + if last[1] { 0 } else { layout.stride }];
-    EndNeighbours {
-        low: [slab[low[0]], slab[low[1]], below[index]],
-        high: [slab[high[0]], slab[high[1]], above[index]],
-        one_sided: [first[0] | last[0], first[1] | last[1], one_sided],
     }
 }

@@ -1,0 +1,146 @@
+//! The quads around crossed edges, and their diagonals.
+
+use alloc::vec::Vec;
+
+use super::{
+    Extent, Offset,
+    cells::{CellVertices, bits_between, place},
+};
+use crate::{
+    signs::SlabLayout,
+    simd::{Simd, nonzero_words},
+};
+
+/// Words of edges that are searched together.
+const WORDS: usize = 64;
+
+/// A quad around a crossed edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quad {
+    /// The vertices of the four cells around the edge, in the order of the quadrants (−, −), (+, −), (+, +), (−, +) of
+    /// the two axes that follow the edge's.
+    pub(super) vertices: [u32; 4],
+    pub(super) axis: u8,
+    /// Whether the edge's low end is inside.
+    pub(super) low_inside: bool,
+    /// Whether the coordinates of the edge's low end have an odd sum.
+    pub(super) is_odd: bool,
+    /// Whether the quad is part of the mesh, and not only of what its vertices are smoothed by.
+    pub(super) is_own: bool,
+}
+
+impl Quad {
+    /// The two triangles.
+    ///
+    /// Of the two diagonals it takes the one whose smaller triangle is larger, as seen along the edge: then both
+    /// triangles face the edge. With vertices strictly within their cells, one diagonal always has such triangles.
+    #[inline(always)]
+    pub(super) fn triangles<const AXIS: usize>(&self, offsets: &[Offset]) -> [u32; 6] {
+        let [a, b, c, d] = self.vertices;
+        let flat = |vertex: u32, [u, v]: [i32; 2]| {
+            let offset = offsets[vertex as usize];
+            [i32::from(offset[(AXIS + 1) % 3]) + u, i32::from(offset[(AXIS + 2) % 3]) + v]
+        };
+        let far = -super::STEPS;
+        let places = [flat(a, [far, far]), flat(b, [0, far]), flat(c, [0, 0]), flat(d, [far, 0])];
+        // The sum of a diagonal's two areas is that of the quad, so the smaller one is largest where they are most
+        // alike.
+        let [to_b, to_c, to_d] =
+            [1, 2, 3].map(|corner: usize| [places[corner][0] - places[0][0], places[corner][1] - places[0][1]]);
+        let cross = |p: [i32; 2], q: [i32; 2]| p[0] * q[1] - p[1] * q[0];
+        let (abc, acd, abd) = (cross(to_b, to_c), cross(to_c, to_d), cross(to_b, to_d));
+        let whole = abc + acd;
+        let (first, second) = ((abc - acd).abs(), (2 * abd - whole).abs());
+        let is_second = (second < first) | ((second == first) & self.is_odd);
+        // The corners twice around, outside first; the second diagonal starts at the next corner.
+        let (b, d) = if self.low_inside { (b, d) } else { (d, b) };
+        let [p, q, r, s] = if is_second { [b, c, d, a] } else { [a, b, c, d] };
+        [p, q, r, p, r, s]
+    }
+}
+
+/// Scratch memory, kept because zeroing it on every call would take time.
+#[derive(Clone, Debug)]
+pub(super) struct QuadSearch {
+    crossed: [u64; WORDS],
+    x: [u32; 64],
+    y: [u32; 64],
+}
+
+impl QuadSearch {
+    pub(super) const fn new() -> Self {
+        Self { crossed: [0; WORDS], x: [0; 64], y: [0; 64] }
+    }
+
+    /// Calls `emit` with all quads around edges along `AXIS` whose low ends are on slab `z`, row by row. `low` and
+    /// `high`: the signs of the edges' ends. `cells`: the vertices of the cells below the slab, and of those above it.
+    #[inline(always)]
+    pub(super) fn find<S: Simd, const AXIS: usize>(
+        &mut self,
+        layout: &SlabLayout,
+        extent: &Extent,
+        z: usize,
+        [low, high]: [&[u64]; 2],
+        cells: [&CellVertices; 2],
+        mut emit: impl FnMut(Quad),
+    ) {
+        let [columns, [first_row, end_row], slabs] = [0, 1, 2].map(|axis| extent.edges(AXIS, axis));
+        if !(slabs[0]..slabs[1]).contains(&z) {
+            return;
+        }
+        let words = layout.words;
+        let (start_word, end_word) = (first_row * words, end_row * words);
+        for start in (start_word..end_word).step_by(WORDS) {
+            let count = (end_word - start).min(WORDS);
+            let (low, high) = (&low[start..][..count], &high[start..][..count]);
+            for ((crossed, low), high) in self.crossed.iter_mut().zip(low).zip(high) {
+                *crossed = low ^ high;
+            }
+            let mut nonzero = nonzero_words::<S>(&mut self.crossed, count);
+            while nonzero != 0 {
+                let i = nonzero.trailing_zeros() as usize;
+                nonzero &= nonzero - 1;
+                let (y, x) = layout.word_position(start + i);
+                let crossed = self.crossed[i % WORDS] & bits_between(x as usize, columns);
+                if crossed == 0 {
+                    continue;
+                }
+                let found = S::positions(crossed, x, y, &mut self.x, &mut self.y);
+                let is_own_row = extent.is_own(1, y as usize) && extent.is_own(2, z);
+                for &x_edge in &self.x[..found] {
+                    let low_inside = low[i] >> (x_edge - x) & 1 == 1;
+                    emit(Quad {
+                        vertices: vertices_around::<AXIS>(layout, cells, x_edge, y),
+                        axis: AXIS as u8,
+                        low_inside,
+                        is_odd: (x_edge as usize + y as usize + z + 3 * extent.origin) % 2 == 1,
+                        is_own: is_own_row && extent.is_own(0, x_edge as usize),
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The vertices of the four cells around an edge along `AXIS` whose low end is at `x`, `y`.
+#[inline(always)]
+fn vertices_around<const AXIS: usize>(
+    layout: &SlabLayout,
+    [below, above]: [&CellVertices; 2],
+    x: u32,
+    y: u32,
+) -> [u32; 4] {
+    let at = place(layout, x, y);
+    let row = layout.size[0];
+    match AXIS {
+        0 => [below.vertex(at - row, 3), below.vertex(at, 2), above.vertex(at, 0), above.vertex(at - row, 1)],
+        1 => [below.vertex(at - 1, 7), above.vertex(at - 1, 5), above.vertex(at, 4), below.vertex(at, 6)],
+        _ => [above.vertex(at - row - 1, 11), above.vertex(at - row, 10), above.vertex(at, 8), above.vertex(at - 1, 9)],
+    }
+}
+
+/// Appends the triangles of a quad.
+#[inline(always)]
+pub(super) fn write<const AXIS: usize>(quad: &Quad, offsets: &[Offset], indices: &mut Vec<u32>) {
+    indices.extend_from_slice(&quad.triangles::<AXIS>(offsets));
+}
