@@ -14,7 +14,7 @@ use crate::{
     buffer::MeshBuffer,
     cell::Edge,
     lattice::Samples,
-    mesher::{MeshError, output::union},
+    mesher::MeshError,
     sample::{
         Weight,
         private::{PerWeight, Sealed},
@@ -138,7 +138,7 @@ impl<W: Weight> Job for DualJob<'_, W> {
         if self.settings.smoothing > 0 {
             self.finish_smooth(&mut batch);
         }
-        self.out.bounds = union(None, batch.bounds());
+        batch.widen(self.extent.origin, self.out);
         Ok(())
     }
 }

@@ -14,7 +14,7 @@ use crate::{
     mesher::{
         crossing::{interpolated, snapped},
         gather::{four, two},
-        output::{commit, reserve},
+        output::{VertexBounds, commit, reserve},
     },
     sample::{Weight, is_sound},
     signs::{EdgeSlabs, SlabLayout},
@@ -46,9 +46,8 @@ pub(super) struct Batch<W: Weight> {
     z_sides: [[W::Pair; BATCH]; 4],
     /// The offset of each vertex in its cell, in steps.
     offsets: [[f32; BATCH]; 3],
-    /// The bounds of all vertices made; empty at first.
-    min: [f32; 3],
-    max: [f32; 3],
+    /// The bounds of all vertices made, counted from the first sample.
+    bounds: VertexBounds,
 }
 
 impl<W: Weight> Batch<W> {
@@ -58,14 +57,16 @@ impl<W: Weight> Batch<W> {
             y_sides: [[W::Pair::default(); BATCH]; 4],
             z_sides: [[W::Pair::default(); BATCH]; 4],
             offsets: [[0.0; BATCH]; 3],
-            min: [f32::INFINITY; 3],
-            max: [f32::NEG_INFINITY; 3],
+            bounds: VertexBounds::NONE,
         }
     }
 
-    /// The smallest box around all positions made.
-    pub(super) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
-        (self.min[0] <= self.max[0]).then_some([self.min, self.max])
+    /// Widens a mesh's bounds to include all positions made. `origin`: the lattice point that they count from.
+    pub(super) fn widen(&self, origin: usize, mesh: &mut MeshBuffer) {
+        self.bounds.widen(mesh);
+        if let Some(bounds) = &mut mesh.bounds {
+            bounds.as_flattened_mut().iter_mut().for_each(|v| *v -= origin as f32);
+        }
     }
 
     /// Copies the samples around the cells of these vertices, at most [`BATCH`].
@@ -231,28 +232,25 @@ impl<W: Weight> Batch<W> {
         let (xs, ys) = (&xs[..len], &ys[..len]);
         let [x_offsets, y_offsets, z_offsets] = &self.offsets;
         let (x_offsets, y_offsets, z_offsets) = (&x_offsets[..len], &y_offsets[..len], &z_offsets[..len]);
-        let origin = slabs.origin as i32;
-        let z = slabs.edges.z as f32 - origin as f32;
+        let (z, origin) = (slabs.edges.z as f32, slabs.origin as f32);
         let written = &mut reserve(&mut out.positions, len)[..len];
-        let (mut min, mut max) = (self.min, self.max);
+        let VertexBounds { mut min, mut max } = self.bounds;
         for i in 0..len {
             let scale = 1.0 / STEPS as f32;
-            let position = [
-                (xs[i] as i32 - origin) as f32 + x_offsets[i] * scale,
-                (ys[i] as i32 - origin) as f32 + y_offsets[i] * scale,
-                z + z_offsets[i] * scale,
-            ];
-            written[i].write(position);
+            let position =
+                [xs[i] as f32 + x_offsets[i] * scale, ys[i] as f32 + y_offsets[i] * scale, z + z_offsets[i] * scale];
+            written[i].write([position[0] - origin, position[1] - origin, position[2] - origin]);
+            // Before the origin is subtracted they are positive, so their bits are in the same order.
             let within = i < count;
             let mut axis = 0;
             while axis < 3 {
-                let v = position[axis];
-                min[axis] = if within & (v < min[axis]) { v } else { min[axis] };
-                max[axis] = if within & (v > max[axis]) { v } else { max[axis] };
+                let bits = position[axis].to_bits();
+                min[axis] = min[axis].min(if within { bits } else { u32::MAX });
+                max[axis] = max[axis].max(if within { bits } else { 0 });
                 axis += 1;
             }
         }
-        (self.min, self.max) = (min, max);
+        self.bounds = VertexBounds { min, max };
         // SAFETY: all of them have been written.
         #[expect(unsafe_code, reason = "spares filling the vector with zeros first")]
         unsafe {

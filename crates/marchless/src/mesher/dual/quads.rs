@@ -52,12 +52,15 @@ impl Quad {
         let whole = abc + acd;
         let (first, second) = ((abc - acd).abs(), (2 * abd - whole).abs());
         let is_second = (second < first) | ((second == first) & self.is_odd);
-        // The corners twice around, outside first; the second diagonal starts at the next corner.
-        let (b, d) = if self.low_inside { (b, d) } else { (d, b) };
-        let [p, q, r, s] = if is_second { [b, c, d, a] } else { [a, b, c, d] };
-        [p, q, r, p, r, s]
+        // A table, since no predictor knows the diagonal.
+        let order = &ORDERS[usize::from(self.low_inside) << 1 | usize::from(is_second)];
+        order.map(|corner| self.vertices[usize::from(corner % 4)])
     }
 }
+
+/// The corners of both triangles, counter-clockwise as seen from outside: where the edge's low end is outside, with the
+/// first and with the second diagonal; then where it is inside.
+const ORDERS: [[u8; 6]; 4] = [[0, 3, 2, 0, 2, 1], [3, 2, 1, 3, 1, 0], [0, 1, 2, 0, 2, 3], [1, 2, 3, 1, 3, 0]];
 
 /// Scratch memory, kept because zeroing it on every call would take time.
 #[derive(Clone, Debug)]
