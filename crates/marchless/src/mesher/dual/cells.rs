@@ -196,7 +196,7 @@ pub(super) const fn bits_between(x: usize, [start, end]: [usize; 2]) -> u64 {
 const fn numbered(edges: u16, number: u32) -> u32 {
     let (mut numbers, mut edge) = (0, 0);
     while edge < 12 {
-        numbers |= (edges as u32 >> edge & 1) * number << (2 * edge);
+        numbers |= ((edges as u32 >> edge & 1) * number) << (2 * edge);
         edge += 1;
     }
     numbers

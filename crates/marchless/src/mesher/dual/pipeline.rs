@@ -309,8 +309,8 @@ fn material<W: Weight>(slabs: &CellSlabs<'_, W>, list: &VertexList, vertex: usiz
     while corners != 0 {
         let corner = corners.trailing_zeros();
         let mut squared = 0;
-        for axis in 0..3 {
-            let from = i32::from(offset[axis]) - STEPS * (corner >> axis & 1) as i32;
+        for (axis, &steps) in offset[..3].iter().enumerate() {
+            let from = i32::from(steps) - STEPS * (corner >> axis & 1) as i32;
             squared += (from * from) as u32;
         }
         if squared < least {

@@ -120,8 +120,8 @@ impl<W: Weight> Batch<W> {
         if !self.place_at_means(slabs.isovalue * W::SCALE, edges, count) {
             for (i, vertex) in range.enumerate() {
                 let offset = plain::mean(slabs, [list.x[vertex], list.y[vertex]], list.edges[vertex]);
-                for axis in 0..3 {
-                    self.offsets[axis][i] = offset[axis];
+                for (of_axis, steps) in self.offsets.iter_mut().zip(offset) {
+                    of_axis[i] = steps;
                 }
             }
         }
@@ -169,8 +169,8 @@ impl<W: Weight> Batch<W> {
     #[inline(always)]
     pub(super) fn set_offsets(&mut self, offsets: &[Offset]) {
         for (i, offset) in offsets[..offsets.len().min(BATCH)].iter().enumerate() {
-            for axis in 0..3 {
-                self.offsets[axis][i] = f32::from(offset[axis]);
+            for (of_axis, &steps) in self.offsets.iter_mut().zip(offset) {
+                of_axis[i] = f32::from(steps);
             }
         }
     }

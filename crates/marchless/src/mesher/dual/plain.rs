@@ -20,8 +20,8 @@ pub(super) fn mean<W: Weight>(slabs: &CellSlabs<'_, W>, cell: [u32; 2], edges: u
     let (mut sum, mut count) = ([0.0; 3], 0.0);
     for edge in Edge::ALL.into_iter().filter(|edge| edges >> edge.index() & 1 == 1) {
         let [a, b] = edge.corners().map(|corner| weight(slabs, cell, corner));
-        for axis in 0..3 {
-            sum[axis] += if edge.axis() == axis {
+        for (axis, sum) in sum.iter_mut().enumerate() {
+            *sum += if edge.axis() == axis {
                 crossing_fraction(a, b, slabs.isovalue * W::SCALE)
             } else {
                 f32::from(edge.corners()[0].offset()[axis])
