@@ -2,7 +2,7 @@
 
 use core::{cell::OnceCell, hint::black_box};
 
-use marchless::{MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless::{DualSettings, MeshBuffer, MeshReport, MeshSettings, Mesher, Samples, Shape, Weight};
 use marchless_benches::Field;
 
 /// A field to mesh; sampled at first use.
@@ -54,6 +54,19 @@ impl Case {
         move || {
             let samples = Samples::new(shape, &weights).expect("one weight a sample").padded();
             mesher.mesh(black_box(samples), &settings, &mut mesh).expect("there are cells to mesh");
+            black_box(&mesh).triangle_count()
+        }
+    }
+
+    /// Our dual mesher on weights of type `W`: each call meshes them once, into warm buffers, and counts the triangles.
+    ///
+    /// It takes the outermost two layers as padding, and so meshes one cell less per axis than the others.
+    pub(crate) fn dual<W: Weight>(&self, settings: DualSettings) -> impl FnMut() -> usize + use<W> {
+        let shape = Shape::cube(self.size).expect("the sizes are small");
+        let (weights, mut mesher, mut mesh) = (self.weights::<W>(), Mesher::new(), MeshBuffer::new());
+        move || {
+            let samples = Samples::new(shape, &weights).expect("one weight a sample").padded();
+            mesher.mesh_dual(black_box(samples), &settings, &mut mesh).expect("there are cells to mesh");
             black_box(&mesh).triangle_count()
         }
     }

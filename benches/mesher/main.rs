@@ -10,7 +10,7 @@
 //! - For fields without a surface, reading all samples once (xor) is close to the lower bound for any mesher.
 //!
 //! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the
-//! default. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread per processor. Up to 128³,
+//! default, and so is the dual mesher. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread per processor. Up to 128³,
 //! these alone take less than a minute:
 //!
 //! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear)?$|MeshReport)'`
@@ -33,7 +33,7 @@ use core::{hint::black_box, time::Duration};
 use std::{env, process::ExitCode};
 
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, measurement::WallTime};
-use marchless::{MeshSettings, Topology};
+use marchless::{DualSettings, MeshSettings, Topology};
 use marchless_benches::Field;
 
 use case::Case;
@@ -129,6 +129,7 @@ fn ours<W: Measured>(group: &mut BenchmarkGroup<'_, WallTime>, results: &mut Res
         results.measure(group, case, Subject::Trilinear(W::NAME), || {
             case.ours::<W>(MeshSettings { topology: Topology::Trilinear, ..MeshSettings::default() })
         });
+        results.measure(group, case, Subject::Dual(W::NAME), || case.dual::<W>(DualSettings::default()));
     }
     if matches!(case.field, Field::Empty | Field::Solid) {
         results.measure(group, case, Subject::Reading(W::NAME), || {

@@ -17,6 +17,8 @@ pub(crate) enum Subject {
     Ours(&'static str),
     /// Ours with `Topology::Trilinear`, on weights of this name.
     Trilinear(&'static str),
+    /// Our dual mesher with normals, on weights of this name.
+    Dual(&'static str),
     /// `MeshReport` on our mesh of the `f32` samples.
     Report,
     /// Ours without normals, on `f32`.
@@ -38,6 +40,7 @@ impl fmt::Display for Subject {
         match self {
             Self::Ours(weight) => write!(f, "marchless {weight}"),
             Self::Trilinear(weight) => write!(f, "marchless {weight}, Trilinear"),
+            Self::Dual(weight) => write!(f, "marchless {weight}, dual"),
             Self::Report => f.write_str("MeshReport"),
             Self::Bare => f.write_str("marchless f32 without normals"),
             Self::Nets => f.write_str("fast-surface-nets f32"),
