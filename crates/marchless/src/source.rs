@@ -114,10 +114,11 @@ pub trait Source: Any + Send + Sync {
     /// divided by [`SourceRegion::spacing`]); NaN counts as outside. `materials`: the same shape, all 0 when called.
     fn fill(&self, region: &SourceRegion, distances: &mut [f32], materials: &mut [u8]);
 
-    /// The same in weights: distances in voxels of level 0, at every level, rounded as [`Weight::from_voxels`] does.
-    /// [`LeafBlock`](crate::LeafBlock) calls it. A source that has such weights at hand may answer with them.
+    /// The same in weights: distances in voxels of level 0, at every level, rounded as
+    /// [`Weight::from_voxels`](crate::Weight::from_voxels) does. [`LeafBlock`](crate::LeafBlock) calls it. A source that
+    /// has such weights at hand may answer with them.
     ///
-    /// `distances`: scratch memory.
+    /// `weights`: of the shape of `materials`. `distances`: scratch memory.
     fn fill_weights(&self, region: &SourceRegion, distances: &mut Vec<f32>, weights: &mut [i16], materials: &mut [u8]) {
         let width = (0..region.level).fold(1.0, |width: f32, _| 2.0 * width);
         distances.clear();
