@@ -120,7 +120,7 @@ pub trait Source: Any + Send + Sync {
     ///
     /// `weights`: of the shape of `materials`. `distances`: scratch memory.
     fn fill_weights(&self, region: &SourceRegion, distances: &mut Vec<f32>, weights: &mut [i16], materials: &mut [u8]) {
-        let width = (0..region.level).fold(1.0, |width: f32, _| 2.0 * width);
+        let width = (1u64 << region.level.min(63)) as f32;
         distances.clear();
         distances.resize(weights.len(), 0.0);
         self.fill(region, distances, materials);
