@@ -10,10 +10,10 @@
 //! - For fields without a surface, reading all samples once (xor) is close to the lower bound for any mesher.
 //!
 //! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the
-//! default, and so is the dual mesher. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread per processor. Up to 128³,
-//! these alone take less than a minute:
+//! default, and so is the dual mesher. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread
+//! per processor. Up to 128³, these alone take about a minute:
 //!
-//! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear)?$|MeshReport)'`
+//! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear|, dual)?$|MeshReport)'`
 //!
 //! Terrains of 1³ to 50³ cells are those of William Svoboda, "Improving the Marching Cubes Algorithm for Use in
 //! Deformable 3D Terrain", table 1. The table repeats the paper's times (C#, an Intel Core i5 of 3.5 GHz, no shared

@@ -4,6 +4,7 @@ mod balance;
 mod block;
 mod change;
 mod tree;
+mod way;
 
 use alloc::{collections::BTreeMap, vec::Vec};
 use core::cmp::Ordering;

@@ -20,8 +20,8 @@
 //! # From samples to a mesh
 //! [`Mesher`] meshes any borrowed [`Samples`] into a reusable [`MeshBuffer`]. [`SlabMesher`] meshes a volume that
 //! arrives slab by slab and need not fit in memory. `ThreadedMesher` (feature `std`) meshes a large volume on several
-//! threads. All three give the same mesh. [`Mesher::mesh_dual`] makes another: one vertex in each cell, fewer slivers,
-//! and smoothing. [`Grid`] keeps a whole volume in chunks, which mesh one by one without seams:
+//! threads. All three give the same mesh. [`Mesher::mesh_dual`] makes another, with vertices inside of cells, which
+//! may be smoothed. [`Grid`] keeps a whole volume in chunks, which mesh one by one without seams:
 //!
 //! ```
 //! use marchless::{Grid, MeshBuffer, MeshReport, MeshSettings, Mesher, Operation, QuantisedShape, QuantisedStamp, Region};
