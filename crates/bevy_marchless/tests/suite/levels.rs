@@ -82,15 +82,31 @@ fn stamp(random: &mut Rng, terrain: Entity) -> Stamp {
     if random.bool() { Stamp::dig(terrain, ball) } else { Stamp::add(terrain, ball, 3) }
 }
 
+/// Says in which update of which flight a check has failed.
+struct When {
+    seed: u64,
+    update: u32,
+}
+
+impl Drop for When {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("in update {} of the flight with seed {}", self.update, self.seed);
+        }
+    }
+}
+
 /// Two viewers that fly, jump, and dig near and far.
 fn fly(mut app: App, updates: u32, seed: u64) {
     let mut random = Rng::with_seed(seed);
+    let mut when = When { seed, update: 0 };
     let ground = app.world_mut().spawn(terrain()).id();
     let viewers = [Vec3::new(-60.0, 10.0, 20.0), Vec3::new(70.0, 12.0, -50.0)].map(|place| viewer(&mut app, place));
     let mut stamps = Vec::new();
     // At first, chunks of the coarsest level come one by one.
     update_until(&mut app, |app| whole(app, ground));
-    for _ in 0..updates {
+    for update in 0..updates {
+        when.update = update;
         for viewer in viewers {
             let mut transform = app.world_mut().get_mut::<Transform>(viewer).expect("it is there");
             let place = match random.u32(0..60) {
