@@ -18,7 +18,7 @@ pub struct LevelChange {
     pub removed: Vec<LeafKey>,
     /// Leaves that are drawn instead, and whether each is empty.
     pub added: Vec<(LeafKey, bool)>,
-    /// Leaves that stay, but whose finer neighbours change, so that they need a new mesh. None of them is empty.
+    /// Leaves that stay, but beside which finer leaves come or go, so that they need a new mesh. None of them is empty.
     pub remeshed: Vec<LeafKey>,
     pub(super) steps: Vec<Step>,
 }
@@ -64,8 +64,8 @@ impl LevelChange {
         self.added.iter().filter(|(_, is_empty)| !is_empty).count() + self.remeshed.len()
     }
 
-    /// All leaves that the change mentions.
-    fn leaves(&self) -> impl Iterator<Item = LeafKey> + '_ {
+    /// All leaves that the change mentions; one that becomes empty, or gets a surface, is there twice.
+    pub fn leaves(&self) -> impl Iterator<Item = LeafKey> + '_ {
         let added = self.added.iter().map(|(leaf, _)| *leaf);
         self.removed.iter().copied().chain(added).chain(self.remeshed.iter().copied())
     }
@@ -156,7 +156,15 @@ impl LevelCover {
         let after = self.leaves_touching(&regions);
         let mut change = LevelChange { steps: steps.into(), ..LevelChange::default() };
         change.added = after.iter().filter(|leaf| before.binary_search(leaf).is_err()).copied().collect();
+        let gone = before.iter().filter(|leaf| after.binary_search(leaf).is_err());
+        change.removed = gone.map(|(leaf, _)| *leaf).collect();
         let coarsest = change.added.iter().map(|(leaf, _)| leaf.level).max().unwrap_or(0);
+        // Beside a leaf, those two levels finer have no surface, but it has their samples at its border.
+        let changed: Vec<LeafKey> = change.leaves().collect();
+        let is_beside_finest = |leaf: LeafKey| {
+            let finest = changed.iter().filter(|changed| changed.level + 1 < leaf.level);
+            finest.into_iter().any(|changed| touch(&changed.region(), &leaf.region()))
+        };
         let mut misfit = None;
         for (leaf, _) in after.iter().filter(|(_, is_empty)| !is_empty) {
             let old = before.binary_search(&(*leaf, false)).ok();
@@ -174,10 +182,10 @@ impl LevelCover {
                     break;
                 }
                 change.remeshed.extend(old.map(|_| *leaf));
+            } else if is_beside_finest(*leaf) {
+                change.remeshed.push(*leaf);
             }
         }
-        let gone = before.into_iter().filter(|leaf| after.binary_search(leaf).is_err());
-        change.removed = gone.map(|(leaf, _)| leaf).collect();
         let made = Made { change, undo, nodes };
         match misfit {
             None => Ok(made),

@@ -184,4 +184,49 @@ proptest! {
             prop_assert!(!is_near || !as_samples.is_empty(leaf), "{:?}", leaf);
         }
     }
+
+    /// A leaf that a change does not mention has the same samples before and after, even if the source answers
+    /// differently at every level.
+    #[test]
+    fn changes_mention_all_leaves_whose_samples_change(
+        viewers in proptest::array::uniform2([-9.0..9.0f64, -3.0..3.0f64, -9.0..9.0f64]),
+        (levels, falloff, meshes) in (3..5u8, 1.75..2.5f64, 0..30usize),
+    ) {
+        // A thin layer of chunks has the surface, so that empty leaves lie beside coarser ones with a surface.
+        let is_empty = |leaf: LeafKey| {
+            let mut chunks = leaf.region().points();
+            !chunks.any(|[x, y, z]| y == (2.0 * libm::sin(f64::from(x) / 3.0) + 2.0 * libm::cos(f64::from(z) / 2.0)) as i32)
+        };
+        let ground = Ground { is_bounded: false };
+        let from = LevelSource {
+            source: &ground,
+            cells: 8,
+            spacing: 1.0,
+            stamps: &[],
+            known: None,
+            planes: None,
+            isovalue: 0.0,
+        };
+        let settings = LevelSettings { levels, falloff, ..LevelSettings::default() };
+        let covers = viewers.map(|position| {
+            LevelCover::new(&[LevelViewer { position, distance: 7.0 }], &settings, None, is_empty).expect("few leaves")
+        });
+        let [mut cover, target] = covers;
+        let (changes, _) = cover.first_changes_to(&target, 40, meshes, |_| 0).expect("the same levels");
+        let (mut before, mut after) = (LeafBlock::new(), LeafBlock::new());
+        for change in changes {
+            let former = cover.clone();
+            cover.apply(&change);
+            let mentioned: Vec<LeafKey> = change.leaves().collect();
+            let near = cover.leaves_near(change.region()).into_iter();
+            for (leaf, _) in near.filter(|(leaf, is_empty)| !is_empty && !mentioned.contains(leaf)) {
+                before.fill(&from, &former, leaf);
+                after.fill(&from, &cover, leaf);
+                prop_assert!(before.finer == after.finer);
+                for (before, after) in boxes(&before).zip(boxes(&after)) {
+                    prop_assert!(before.weights == after.weights && before.materials == after.materials, "{:?}", leaf);
+                }
+            }
+        }
+    }
 }
