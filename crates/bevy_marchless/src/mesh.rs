@@ -190,10 +190,9 @@ impl MeshUpdate<'_, '_, '_> {
         while let Some(prepared) = terrain.heart.next_changed() {
             self.start(terrain, prepared);
         }
-        self.show_level_changes(terrain, true);
         let edits = start.elapsed();
         (self.edits, self.until) = (self.edits + edits, self.until + edits);
-        self.show_level_changes(terrain, false);
+        self.show_level_changes(terrain);
         self.start_level_changes(terrain);
         terrain.heart.sort_ready(self.until);
         self.first_meshes(terrain);
@@ -228,11 +227,11 @@ impl MeshUpdate<'_, '_, '_> {
         }
     }
 
-    /// Shows changes of levels that are meshed; with `urgent`, those that edits have made.
-    fn show_level_changes(&mut self, terrain: &mut MeshedTerrain, urgent: bool) {
+    /// Shows changes of levels that are meshed.
+    fn show_level_changes(&mut self, terrain: &mut MeshedTerrain) {
         let mut done = 0;
-        while (urgent || done == 0 || self.bytes <= self.max_upload_bytes && Instant::now() < self.until)
-            && let Some((change, inputs)) = terrain.heart.next_level_change(urgent)
+        while (done == 0 || self.bytes <= self.max_upload_bytes && Instant::now() < self.until)
+            && let Some((change, inputs)) = terrain.heart.next_level_change()
         {
             let (settings, style) = (terrain.heart.mesh_settings(), self.presenter.style(terrain.heart.colors()));
             let at_once = mesh_now(&inputs, &settings, style.as_ref(), &self.presenter.pool);
@@ -240,16 +239,11 @@ impl MeshUpdate<'_, '_, '_> {
             drop(inputs);
             let shown = terrain.heart.show_level_change(change, at_once);
             self.bytes += shown.swaps.iter().map(|swap| geometry_bytes(&swap.meshed.geometry)).sum::<usize>();
-            if !urgent {
-                let is_shown = |swap: &&Swap| !matches!(swap.place, ShowTarget::Nowhere);
-                let shown_len = shown.swaps.iter().filter(is_shown).count();
-                let entities = (shown_len + terrain.heart.table().released_len()) as u32;
-                self.until = self.until.checked_sub(ENTITY_TIME * entities).unwrap_or(self.until);
-            }
+            let is_shown = |swap: &&Swap| !matches!(swap.place, ShowTarget::Nowhere);
+            let shown_len = shown.swaps.iter().filter(is_shown).count();
+            let entities = (shown_len + terrain.heart.table().released_len()) as u32;
+            self.until = self.until.checked_sub(ENTITY_TIME * entities).unwrap_or(self.until);
             self.show(terrain, shown);
-            for entity in terrain.heart.take_released() {
-                self.presenter.commands.entity(entity).try_despawn();
-            }
             done += 1;
         }
     }
@@ -349,17 +343,16 @@ impl MeshUpdate<'_, '_, '_> {
 
     /// Starts a group: meshes and shows a small one within this update, or starts jobs for a larger one.
     fn start(&mut self, terrain: &mut MeshedTerrain, prepared: PreparedGroup) {
-        let count = prepared.to_mesh.len();
-        if count > self.inline.min(self.inline_left) {
+        if prepared.changed > self.inline.min(self.inline_left) {
             return self.start_jobs(terrain, prepared, Priority::Edit);
         }
-        self.inline_left -= count;
-        let (settings, mut group) = (terrain.heart.mesh_settings(), prepared.group);
+        let PreparedGroup { mut group, to_mesh, changed } = prepared;
+        self.inline_left -= changed;
+        let settings = terrain.heart.mesh_settings();
         let style = self.presenter.style(terrain.heart.colors());
-        let inputs: Vec<_> = prepared.to_mesh.iter().map(|key| (*key, terrain.heart.mesh_input(*key))).collect();
-        let meshed = mesh_now(&inputs, &settings, style.as_ref(), &self.presenter.pool);
+        let meshed = mesh_now(&to_mesh, &settings, style.as_ref(), &self.presenter.pool);
         // What holds samples while they are shown keeps their memory from being reused.
-        drop(inputs);
+        drop(to_mesh);
         self.presenter.pool.prepare(meshed.iter().map(|meshed| &*meshed.geometry), style.is_some());
         for meshed in meshed {
             self.presenter.stats.count_mesh(meshed.time);
@@ -377,8 +370,7 @@ impl MeshUpdate<'_, '_, '_> {
         }
         let (results, settings) = (terrain.heart.mesh_results().clone(), terrain.heart.mesh_settings());
         let style = self.presenter.style(terrain.heart.colors());
-        terrain.heart.start(prepared, |heart, id, key| {
-            let input = heart.mesh_input(key);
+        terrain.heart.start(prepared, |id, key, input| {
             let (results, style) = (results.clone(), style.clone());
             self.queue.push(priority, move || {
                 let meshed = mesh_chunk(&input, key, &settings, style.as_ref(), None);
@@ -410,6 +402,10 @@ impl MeshUpdate<'_, '_, '_> {
         }
         for since in shown.since {
             self.presenter.stats.count_edit_shown(since);
+        }
+        // Those of leaves that others have replaced.
+        for entity in terrain.heart.take_released() {
+            self.presenter.commands.entity(entity).try_despawn();
         }
     }
 }

@@ -28,8 +28,10 @@ struct EditedSet {
     edit: Edit,
     /// Chunks with changed samples.
     chunks: Vec<[i32; 3]>,
-    /// Chunks, and leaves of coarser levels, whose meshes read changed samples.
+    /// Chunks, and leaves of coarser levels, whose meshes read changed samples; and the leaves of `places`.
     affected: BTreeSet<ChunkKey>,
+    /// The changes of levels that make place for it.
+    places: BTreeSet<u64>,
     since: RequestTime,
 }
 
@@ -70,6 +72,7 @@ impl EditedSet {
         self.edit.merge(&other.edit);
         self.chunks.extend(other.chunks);
         self.affected.extend(other.affected);
+        self.places.extend(other.places);
         self.since = RequestTime::earlier(Some(self.since), Some(other.since)).unwrap_or(self.since);
     }
 }
@@ -78,17 +81,18 @@ impl Heart {
     /// Applies a stamp that was read at `since`.
     pub(crate) fn stamp(&mut self, stamp: QuantisedStamp, since: RequestTime, edits: &mut Edits) {
         let touched = stamp.region();
-        self.make_place(touched);
+        let place = self.make_place(touched);
         let changed = self.samples.stamp(stamp, &mut edits.before);
         changed.crowded.into_iter().for_each(|position| self.crowded.push(ChunkKey::finest(position)));
         for position in &changed.chunks {
             self.table.samples_changed(ChunkKey::finest(*position));
         }
-        let coarser = self.stamped_leaves(touched);
+        let mut coarser = self.stamped_leaves(touched);
+        coarser.extend(place.iter().flat_map(|id| self.leaves_of_place(*id)));
         if !changed.edit.is_empty() || !coarser.is_empty() {
             let super::samples::StampChanges { edit, chunks, affected, .. } = changed;
             let affected = affected.into_iter().map(ChunkKey::finest).chain(coarser).collect();
-            edits.add(EditedSet { edit, chunks, affected, since });
+            edits.add(EditedSet { edit, chunks, affected, places: place.into_iter().collect(), since });
         }
     }
 
@@ -97,14 +101,14 @@ impl Heart {
         let Edits { sets, before, .. } = edits;
         let settings = self.mesh_settings();
         let mut reports = Vec::new();
-        for EditedSet { edit, chunks, affected, since } in sets.into_iter().flatten() {
+        for EditedSet { edit, chunks, affected, places, since } in sets.into_iter().flatten() {
             let before: BTreeMap<_, _> =
                 chunks.iter().filter_map(|chunk| Some((*chunk, before.get(chunk)?.clone()))).collect();
             let redrawn = self.samples.newest().chunks_with_mesh_changes(&before, edit.region, &settings);
             let is_same =
                 |key: &&ChunkKey| key.level == 0 && redrawn.as_ref().is_some_and(|r| !r.contains(&key.position));
             let unchanged_meshes = affected.iter().filter(is_same).copied().collect();
-            self.changed(Pending { chunks: affected, unchanged_meshes, since: Some(since) });
+            self.changed(Pending { chunks: affected, unchanged_meshes, places, since: Some(since) });
             reports.extend(Some(edit).filter(|edit| !edit.is_empty()));
         }
         reports
@@ -149,7 +153,7 @@ impl Heart {
 
     /// Records that chunks have changed together.
     pub(super) fn changed(&mut self, pending: Pending) {
-        if !self.table.makes_meshes() {
+        if !self.table.makes_meshes() && pending.places.is_empty() {
             return;
         }
         for key in &pending.chunks {
@@ -168,7 +172,8 @@ mod tests {
         let affected: BTreeSet<_> = chunks.clone().map(|x| ChunkKey::finest([x, 0, 0])).collect();
         let mut edit = Edit { region: Region::new([chunks.start, 0, 0], [chunks.end, 1, 1]), ..Edit::NONE };
         edit.removed.add(0, volume);
-        EditedSet { edit, chunks: vec![[chunks.start, 0, 0]], affected, since: TerrainStats::default().now() }
+        let (chunks, places) = (vec![[chunks.start, 0, 0]], BTreeSet::new());
+        EditedSet { edit, chunks, affected, places, since: TerrainStats::default().now() }
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub(crate) struct Pending {
     pub(crate) chunks: BTreeSet<ChunkKey>,
     /// The chunks of the set whose meshes, if drawn, do not change.
     pub(crate) unchanged_meshes: BTreeSet<ChunkKey>,
+    /// The changes of levels that make place for its edits, and are shown with it. Their leaves are among the chunks.
+    pub(crate) places: BTreeSet<u64>,
     /// The time of the first edit in the set; `None` without edits.
     pub(crate) since: Option<RequestTime>,
 }
@@ -50,6 +52,8 @@ pub(crate) struct Group {
     pub(super) snapshot: BTreeMap<[i32; 3], GridChunk<i16>>,
     /// The appearance of its meshes.
     pub(super) appearance: u64,
+    /// The changes of levels that are shown with it, as in [`Pending`].
+    pub(super) places: BTreeSet<u64>,
     pub(super) since: Option<RequestTime>,
     pub(super) purpose: Purpose,
     /// The number of chunks to be meshed before the group is complete.
@@ -106,6 +110,12 @@ impl Groups {
     /// Whether a pending set may start.
     pub(super) const fn may_start(&self) -> bool {
         self.is_awake
+    }
+
+    /// Whether an edit for which levels make place has not been shown.
+    pub(super) fn makes_place(&self) -> bool {
+        let pending = self.pending.values().map(|pending| &pending.places);
+        pending.chain(self.running.values().map(|group| &group.places)).any(|places| !places.is_empty())
     }
 
     /// The number of running groups that give way to edits.
@@ -224,7 +234,7 @@ impl Groups {
         let Self { pending, running, .. } = mem::take(self);
         let of_group = |group: Group| {
             let unchanged_meshes = BTreeSet::new();
-            Pending { chunks: group.chunks, unchanged_meshes, since: group.since }
+            Pending { chunks: group.chunks, unchanged_meshes, places: group.places, since: group.since }
         };
         running.into_values().map(of_group).chain(pending.into_values()).collect()
     }
@@ -263,6 +273,7 @@ impl Pending {
         other.unchanged_meshes.retain(|key| !self.chunks.contains(key) || self.unchanged_meshes.contains(key));
         self.unchanged_meshes.append(&mut other.unchanged_meshes);
         self.chunks.append(&mut other.chunks);
+        self.places.append(&mut other.places);
         self.since = RequestTime::earlier(self.since, other.since);
     }
 }
@@ -276,7 +287,7 @@ mod tests {
     }
 
     fn pending(xs: &[i32], same: &[i32]) -> Pending {
-        Pending { chunks: set(xs), unchanged_meshes: set(same), since: None }
+        Pending { chunks: set(xs), unchanged_meshes: set(same), ..Pending::default() }
     }
 
     fn group(xs: &[i32], purpose: Purpose) -> Group {
@@ -284,6 +295,7 @@ mod tests {
             chunks: set(xs),
             snapshot: BTreeMap::new(),
             appearance: 0,
+            places: BTreeSet::new(),
             since: None,
             purpose,
             members: 1,

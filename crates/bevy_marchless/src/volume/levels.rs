@@ -5,8 +5,8 @@
 //! neighbour whose border changes. Changes that overlap wait for each other.
 //!
 //! An edit is shown in the leaves that are drawn. A change under way meshes what the edit touched again when it is
-//! shown, and waits while an edit of its leaves is being meshed. An edit in a box that was empty splits it in the same
-//! update.
+//! shown, and waits while an edit of its leaves is being meshed. An edit in a box that was empty splits it: that change
+//! belongs to the edit, is meshed with it and shown in the same update.
 
 mod cache;
 mod changes;
@@ -82,8 +82,8 @@ struct Running {
     change: Arc<LevelChange>,
     /// The changes that are to be shown before it.
     after: Vec<u64>,
-    /// Whether it is to be shown in this update, as far as possible.
-    is_urgent: bool,
+    /// Whether it makes place for an edit, with which it is meshed and shown.
+    is_of_edit: bool,
     meshing: Option<Meshing>,
 }
 
@@ -280,13 +280,13 @@ impl Levels {
         })
     }
 
-    /// The coarser leaves that are drawn and read these lattice points.
+    /// The coarser leaves that read these lattice points and are drawn, or will be with earlier edits.
     fn drawn_readers(&self, points: Region, cells: u32) -> Vec<ChunkKey> {
         let chunk = |v: i32| v.div_euclid(cells as i32);
         let chunks = Region::new(points.min.map(chunk), points.max.map(|v| chunk(v - 1) + 1));
         // A reader touches the points' chunks, or reaches one point of its own level beyond itself.
         let reach = (1u32 << self.settings.levels).div_ceil(cells);
-        let leaves = self.shown.leaves_near(chunks.grown(reach, reach));
+        let leaves = self.cover_of_edits().leaves_near(chunks.grown(reach, reach));
         let leaves = leaves.into_iter().filter(|(leaf, is_empty)| leaf.level > 0 && !is_empty);
         leaves.map(|(leaf, _)| leaf.into()).filter(|key| reads(*key, points, cells)).collect()
     }
@@ -323,7 +323,7 @@ impl Levels {
         let mut gone = BTreeSet::new();
         for (id, running) in &self.running {
             let is_gone = is_out_of_date(running) || running.after.iter().any(|before| gone.contains(before));
-            if is_gone && !running.is_urgent {
+            if is_gone && !running.is_of_edit {
                 gone.insert(*id);
             }
         }

@@ -10,7 +10,7 @@ use super::groups::{ChunkMesh, Group, Pending, Purpose};
 use super::levels::LevelMesh;
 use super::samples::shares_samples;
 use super::table::{DrawnMesh, ShowTarget};
-use super::{Heart, Restyled};
+use super::{Heart, MeshInput, Restyled};
 use crate::chunk::ChunkKey;
 use crate::jobs::Ticket;
 use crate::stats::RequestTime;
@@ -18,7 +18,9 @@ use crate::stats::RequestTime;
 /// A group before it starts, and its chunks that are to be meshed.
 pub(crate) struct PreparedGroup {
     pub(crate) group: Group,
-    pub(crate) to_mesh: Vec<ChunkKey>,
+    pub(crate) to_mesh: Vec<(ChunkKey, MeshInput)>,
+    /// The number of chunks to be meshed that have changed; the others make place for the changes.
+    pub(crate) changed: usize,
 }
 
 /// The result of a meshing job.
@@ -120,13 +122,13 @@ impl Heart {
 
     /// Prepares a group from changed chunks; `None` if none needs a new mesh, or they have to wait for samples.
     fn prepare(&mut self, pending: Pending, purpose: Purpose) -> Option<PreparedGroup> {
+        let place = self.place(&pending.places);
         // All chunks of a set change together: if samples around a drawn one are missing, all wait for them.
-        let lacking: Vec<ChunkKey> = pending
-            .chunks
-            .iter()
-            .copied()
-            .filter(|key| self.table.is_shown(*key) && self.lacks_samples(*key))
-            .collect();
+        let lacks = |key: &ChunkKey| match place.leaves.get(key) {
+            Some(is_added) => *is_added && self.table.lacks_samples(*key),
+            None => self.table.is_shown(*key) && self.lacks_samples(*key),
+        };
+        let lacking: Vec<ChunkKey> = pending.chunks.iter().copied().filter(lacks).collect();
         if !lacking.is_empty() {
             for key in lacking {
                 self.table.set_stale(key);
@@ -137,11 +139,12 @@ impl Heart {
             }
             return None;
         }
-        let Pending { chunks, unchanged_meshes, since } = pending;
+        let Pending { chunks, unchanged_meshes, places, since } = pending;
         let mut group = Group {
             chunks,
             snapshot: BTreeMap::new(),
             appearance: self.appearance.number,
+            places,
             since,
             purpose,
             members: 0,
@@ -149,10 +152,14 @@ impl Heart {
             tickets: Vec::new(),
         };
         let mut to_mesh = Vec::new();
-        for key in group.chunks.iter().copied().filter(|key| self.table.can_be_drawn(*key)) {
+        for key in group.chunks.iter().copied() {
+            let is_added = place.leaves.get(&key).copied();
+            if !is_added.unwrap_or_else(|| self.table.can_be_drawn(key)) || !self.table.makes_meshes() {
+                continue;
+            }
             if key.level > 0 {
                 group.members += 1;
-                to_mesh.push(key);
+                to_mesh.push((key, self.input_in(&place, key)));
                 continue;
             }
             let samples = self.samples.newest().neighbourhood_view(key.position);
@@ -165,28 +172,29 @@ impl Heart {
                     group.snapshot.entry(near.position).or_insert_with(|| chunk.clone());
                 }
             }
-            if self.table.is_current(key) && unchanged_meshes.contains(&key) {
+            if is_added.is_none() && self.table.is_current(key) && unchanged_meshes.contains(&key) {
                 continue;
             }
             group.members += 1;
             if samples.is_uniform() {
                 group.meshed.push(ChunkMesh::empty(key));
             } else {
-                to_mesh.push(key);
+                to_mesh.push((key, self.input_in(&place, key)));
             }
         }
-        if group.members == 0 && group.snapshot.is_empty() {
+        if group.members == 0 && group.snapshot.is_empty() && group.places.is_empty() {
             return None;
         }
-        Some(PreparedGroup { group, to_mesh })
+        let changed = to_mesh.iter().filter(|(key, _)| !place.has_mesh(*key)).count();
+        Some(PreparedGroup { group, to_mesh, changed })
     }
 
     /// Starts a group whose chunks are meshed in jobs. `start` starts the job for a chunk, for the group with this
     /// number.
-    pub(crate) fn start(&mut self, prepared: PreparedGroup, mut start: impl FnMut(&Self, u64, ChunkKey) -> Ticket) {
-        let PreparedGroup { group, to_mesh } = prepared;
+    pub(crate) fn start(&mut self, prepared: PreparedGroup, start: impl Fn(u64, ChunkKey, MeshInput) -> Ticket) {
+        let PreparedGroup { group, to_mesh, .. } = prepared;
         let id = self.groups.start(group);
-        let tickets: Vec<Ticket> = to_mesh.into_iter().map(|key| start(self, id, key)).collect();
+        let tickets: Vec<Ticket> = to_mesh.into_iter().map(|(key, input)| start(id, key, input)).collect();
         if let Some(group) = self.groups.get_mut(id) {
             group.tickets = tickets;
         }
@@ -230,7 +238,11 @@ impl Heart {
 
     /// Shows all chunks of a complete group.
     pub(crate) fn show(&mut self, group: Group) -> Shown {
-        let Group { chunks, snapshot, appearance, since, meshed, .. } = group;
+        let Group { chunks, snapshot, appearance, places, since, meshed, .. } = group;
+        let mut left = Vec::new();
+        for id in places {
+            left.extend(self.change_leaves(id));
+        }
         let is_left = |meshed: &ChunkMesh| chunks.contains(&meshed.key);
         let swaps = meshed.into_iter().filter(is_left).map(|meshed| self.swap(meshed, appearance)).collect();
         for (position, chunk) in snapshot {
@@ -242,6 +254,7 @@ impl Heart {
         for key in chunks {
             self.shown(key);
         }
+        self.leaving_around(&left);
         Shown { swaps, since: since.into_iter().collect() }
     }
 

@@ -109,6 +109,7 @@ impl Heart {
                     chunks,
                     snapshot: Default::default(),
                     appearance: self.appearance.number,
+                    places: Default::default(),
                     since: None,
                     purpose: Purpose::Restyle,
                     members: 1,
@@ -240,11 +241,12 @@ impl Heart {
         }
     }
 
-    /// Whether at most `inline` chunks are missing until the transition ends, and all of them can be meshed now.
+    /// Whether at most `inline` chunks are missing until the transition ends, and all of them can be meshed now. An edit
+    /// that changes levels is shown before.
     pub(crate) fn may_end_transition(&self, inline: usize) -> bool {
         self.transition.as_ref().is_some_and(|transition| {
             transition.running.is_empty() && transition.lacking.is_empty() && transition.waiting.len() <= inline
-        })
+        }) && !self.groups.makes_place()
     }
 
     /// Takes in a chunk that was meshed at once for the isovalue to come.

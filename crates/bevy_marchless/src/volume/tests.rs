@@ -22,11 +22,12 @@ const CELLS: u32 = 8;
 /// Of every extent.
 const WHOLE: Region = Region { min: [-4, -3, -4], max: [5, 3, 4] };
 /// The extents that a terrain may be given.
-const EXTENTS: [Region; 4] = [
+const EXTENTS: [Region; 5] = [
     WHOLE,
     Region { min: [-3, -3, -4], max: [5, 3, 4] },
     Region { min: [-3, -2, -3], max: [3, 2, 3] },
     Region { min: [-1, -1, 0], max: [0, 1, 4] },
+    Region { min: [-3, -2, -3], max: [3, 6, 3] },
 ];
 
 /// What happens to a terrain. Lengths in chunks.
@@ -194,8 +195,13 @@ impl Game {
         self.heart.set_view(Entity::from_raw_u32(viewer), view);
     }
 
-    /// What the systems do in an update. `late`: there is no time.
     fn update(&mut self, jobs: usize, inline: usize, late: bool) {
+        self.run_systems(jobs, inline, late);
+        self.check();
+    }
+
+    /// What the systems do in an update. `late`: there is no time.
+    fn run_systems(&mut self, jobs: usize, inline: usize, late: bool) {
         let now = Instant::now();
         let until = if late { now } else { now + Duration::from_millis(5) };
         self.heart.follow(until, &mut self.stats);
@@ -213,7 +219,6 @@ impl Game {
         }
         self.mesh(inline, until);
         (0..jobs).for_each(|_| _ = do_next(&self.queue));
-        self.check();
     }
 
     fn apply_stamps(&mut self) {
@@ -241,14 +246,13 @@ impl Game {
         }
         self.heart.take_plan();
         while let Some(prepared) = self.heart.next_changed() {
-            if prepared.to_mesh.len() <= inline {
+            if prepared.changed <= inline {
                 self.show_now(prepared);
             } else {
                 self.start(prepared, Priority::Edit);
             }
         }
-        self.change_levels(true);
-        self.change_levels(false);
+        self.change_levels();
         self.heart.sort_ready(until);
         while let Some((prepared, urgency)) = self.heart.next_first_mesh(8) {
             self.start(prepared, Priority::FirstMesh(urgency));
@@ -292,16 +296,12 @@ impl Game {
         }
     }
 
-    fn change_levels(&mut self, urgent: bool) {
-        while let Some((change, inputs)) = self.heart.next_level_change(urgent) {
+    fn change_levels(&mut self) {
+        while let Some((change, inputs)) = self.heart.next_level_change() {
             let settings = self.heart.mesh_settings();
             let at_once = inputs.iter().map(|(key, input)| meshed(input, *key, &settings)).collect();
             let shown = self.heart.show_level_change(change, at_once);
             self.show(shown);
-            self.take_released();
-        }
-        if urgent {
-            return;
         }
         self.heart.start_level_changes();
         while let Some(jobs) = self.heart.next_level_jobs(8) {
@@ -320,10 +320,10 @@ impl Game {
     }
 
     fn show_now(&mut self, prepared: PreparedGroup) {
-        let PreparedGroup { mut group, to_mesh } = prepared;
+        let PreparedGroup { mut group, to_mesh, .. } = prepared;
         let settings = self.heart.mesh_settings();
-        for key in to_mesh {
-            group.push(meshed(&self.heart.mesh_input(key), key, &settings));
+        for (key, input) in to_mesh {
+            group.push(meshed(&input, key, &settings));
         }
         let shown = self.heart.show(group);
         self.show(shown);
@@ -334,8 +334,7 @@ impl Game {
             return self.show_now(prepared);
         }
         let (results, settings) = (self.heart.mesh_results().clone(), self.heart.mesh_settings());
-        self.heart.start(prepared, |heart, id, key| {
-            let input = heart.mesh_input(key);
+        self.heart.start(prepared, |id, key, input| {
             let results = results.clone();
             self.queue.push(priority, move || {
                 results.push(MeshResult::OfGroup(id, meshed(&input, key, &settings)));
@@ -363,6 +362,7 @@ impl Game {
                 }
             }
         }
+        self.take_released();
     }
 
     /// What holds in every update.

@@ -26,7 +26,7 @@ impl Heart {
                 levels.finest.entry(position).or_insert(false);
                 coming.push(position);
             }
-            let running = Running { change, after, is_urgent: false, meshing: None };
+            let running = Running { change, after, is_of_edit: false, meshing: None };
             levels.running.insert(id, running);
         }
         self.load_around(&coming);
@@ -54,7 +54,7 @@ impl Heart {
             }
             let may_begin = |running: &Running| {
                 let has_samples = || running.finest().all(|position| self.is_surrounded(position));
-                running.meshing.is_none() && !running.is_urgent && has_samples()
+                running.meshing.is_none() && !running.is_of_edit && has_samples()
             };
             // In the order in which they are to be shown, where that matters.
             let change = *levels.running.iter().find(|(_, running)| may_begin(running))?.0;
@@ -125,61 +125,29 @@ impl Heart {
         }
     }
 
-    /// The next change that can be shown, and what is to be meshed first. `urgent`: only those that cannot wait.
-    pub(crate) fn next_level_change(&mut self, urgent: bool) -> Option<(u64, Vec<(ChunkKey, MeshInput)>)> {
-        let makes_meshes = self.table.makes_meshes();
+    /// The next change that can be shown, and what is to be meshed first.
+    pub(crate) fn next_level_change(&mut self) -> Option<(u64, Vec<(ChunkKey, MeshInput)>)> {
         let levels = self.levels.as_ref()?;
-        let may_be_shown = |running: &Running| {
-            running.is_urgent == urgent
-                && (running.is_meshed() || urgent)
-                && self.is_next(running)
-                && self.is_free(running)
-        };
-        let mut all = levels.running.iter();
-        let id = *all.find(|(_, running)| may_be_shown(running))?.0;
-        let running = levels.running.get(&id)?;
-        if running.meshing.is_none() {
-            return Some((id, self.begin_meshing(id, makes_meshes)));
-        }
+        let may_be_shown = |running: &Running| running.is_meshed() && self.is_next(running) && self.is_free(running);
+        let (id, running) = levels.running.iter().find(|(_, running)| may_be_shown(running))?;
         let Meshing { cover, stale, .. } = running.meshing.as_ref()?;
-        Some((id, stale.iter().map(|key| (*key, self.input(*key, cover))).collect()))
+        Some((*id, stale.iter().map(|key| (*key, self.input(*key, cover))).collect()))
     }
 
     /// Whether no edit of a change's leaves is being meshed.
     fn is_free(&self, running: &Running) -> bool {
-        let is_free = |key: ChunkKey| !self.groups.is_claimed(key) && !self.groups.is_pending(key);
-        let Some(levels) = self.levels.as_ref().filter(|_| running.is_urgent) else {
-            let replaced = running.change.removed.iter().chain(&running.change.remeshed);
-            return replaced.map(|leaf| ChunkKey::from(*leaf)).all(is_free);
-        };
-        // The edit that began it may be in its neighbours alone.
-        levels.shown.leaves_near(running.change.region()).into_iter().all(|(leaf, _)| is_free(leaf.into()))
+        let replaced = running.change.removed.iter().chain(&running.change.remeshed);
+        let mut replaced = replaced.map(|leaf| ChunkKey::from(*leaf));
+        replaced.all(|key| !self.groups.is_claimed(key) && !self.groups.is_pending(key))
     }
 
     /// Shows a change, with meshes that were made at once.
     pub(crate) fn show_level_change(&mut self, id: u64, at_once: Vec<ChunkMesh>) -> Shown {
         let mut shown = Shown::default();
-        let Some(running) = self.levels.as_mut().and_then(|levels| levels.running.remove(&id)) else { return shown };
-        let Running { change, meshing: Some(meshing), .. } = running else { return shown };
-        let mut left = Vec::new();
-        for leaf in &change.removed {
-            self.drop_leaf((*leaf).into());
-            left.extend((leaf.level == 0).then_some(leaf.position));
-        }
-        let added: Vec<ChunkKey> =
-            change.added.iter().filter(|(_, is_empty)| !is_empty).map(|(leaf, _)| (*leaf).into()).collect();
-        for key in &added {
-            if key.level == 0 {
-                self.table.promote(*key);
-            } else if self.table.makes_meshes() {
-                self.table.load_coarser(*key);
-            }
-        }
-        if let Some(levels) = &mut self.levels {
-            levels.leave_finest(&left, true);
-            levels.finest.extend(finest(&change).map(|position| (position, true)));
-            Arc::make_mut(&mut levels.shown).apply(&change);
-        }
+        let running = self.levels.as_mut().and_then(|levels| levels.running.get_mut(&id));
+        let Some(running) = running else { return shown };
+        let (change, Some(meshing)) = (running.change.clone(), running.meshing.take()) else { return shown };
+        let left = self.change_leaves(id);
         let remade: BTreeSet<ChunkKey> = at_once.iter().map(|meshed| meshed.key).collect();
         let Meshing { appearance, meshed, .. } = meshing;
         let kept = meshed.into_iter().filter(|meshed| !remade.contains(&meshed.key)).map(|meshed| (meshed, appearance));
@@ -190,7 +158,8 @@ impl Heart {
         }
         for position in finest(&change) {
             for near in ChunkKey::finest(position).around() {
-                if self.table.contains(near) && (added.contains(&near) || !self.table.is_shown(near)) {
+                let is_new = || finest(&change).any(|new| new == near.position);
+                if self.table.contains(near) && (!self.table.is_shown(near) || is_new()) {
                     self.samples.show_newest(near.position);
                 }
             }
@@ -200,8 +169,32 @@ impl Heart {
         shown
     }
 
+    /// Makes a change of leaves; their meshes follow. Returns the chunks of the finest level that are no leaves any more.
+    pub(in crate::volume) fn change_leaves(&mut self, id: u64) -> Vec<[i32; 3]> {
+        let mut left = Vec::new();
+        let Some(running) = self.levels.as_mut().and_then(|levels| levels.running.remove(&id)) else { return left };
+        let change = running.change;
+        for leaf in &change.removed {
+            self.drop_leaf((*leaf).into());
+            left.extend((leaf.level == 0).then_some(leaf.position));
+        }
+        for (leaf, _) in change.added.iter().filter(|(_, is_empty)| !is_empty) {
+            if leaf.level == 0 {
+                self.table.promote((*leaf).into());
+            } else if self.table.makes_meshes() {
+                self.table.load_coarser((*leaf).into());
+            }
+        }
+        if let Some(levels) = &mut self.levels {
+            levels.leave_finest(&left, true);
+            levels.finest.extend(finest(&change).map(|position| (position, true)));
+            Arc::make_mut(&mut levels.shown).apply(&change);
+        }
+        left
+    }
+
     /// Notes that chunks of the finest level, and those around them, may not be needed any more.
-    pub(super) fn leaving_around(&mut self, positions: &[[i32; 3]]) {
+    pub(in crate::volume) fn leaving_around(&mut self, positions: &[[i32; 3]]) {
         for near in positions.iter().flat_map(|position| ChunkKey::finest(*position).around()) {
             if self.table.contains(near) {
                 self.leaving.push(near);

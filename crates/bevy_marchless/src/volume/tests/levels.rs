@@ -162,3 +162,55 @@ proptest! {
         game.follow_residency();
     }
 }
+
+/// Balls in the air and on the ground, one upon the other, while meshes take long.
+fn building() -> impl Strategy<Value = Event> {
+    let place = || (-2.5..2.5f64, -0.5..5.5f64, -2.5..2.5f64).prop_map(|(x, y, z)| [x, y, z]);
+    prop_oneof![
+        1 => place().prop_map(|middle| Event::View { viewer: 0, view: Some((middle, 1.0, 0.0, None)) }),
+        6 => (place(), 0.1..0.9f64, prop::bool::weighted(0.8))
+            .prop_map(|(center, radius, add)| Event::QuantisedStamp { center, radius, add }),
+        8 => (0usize..20, prop_oneof![Just(0usize), Just(8)])
+            .prop_map(|(jobs, inline)| Event::Update { jobs, inline, late: false }),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn what_is_built_in_the_air_is_closed(
+        detail in detail(),
+        events in prop::collection::vec(building(), 1..60),
+    ) {
+        let mut game = Game::with_levels(detail);
+        game.happen(&Event::Extent { index: 4 });
+        game.follow_residency();
+        for event in &events {
+            game.happen(event);
+        }
+        game.follow_residency();
+    }
+}
+
+#[test]
+fn edits_make_place_without_meshes() {
+    let detail = LevelDetail { levels: 3, falloff: 2.0, hysteresis: 0.0 };
+    let mut game = Game::with_levels(detail);
+    game.heart = Heart::new(game.settings.clone(), 0.0, true, colors(), false);
+    game.heart.set_levels(Some(detail));
+    game.keep();
+    game.happen(&Event::View { viewer: 0, view: Some(([0.5, 2.5, 0.5], 1.0, 0.0, None)) });
+    for _ in 0..200 {
+        game.run_systems(30, 8, false);
+    }
+    let is_empty = |game: &Game| {
+        let cover = game.heart.levels.as_ref().expect("there are levels").shown_cover();
+        let (_, is_empty) = cover.leaves().find(|(leaf, _)| leaf.region().contains([0, 2, 0])).expect("it is kept");
+        is_empty
+    };
+    assert!(is_empty(&game));
+    game.happen(&Event::QuantisedStamp { center: [0.5, 2.5, 0.5], radius: 0.3, add: true });
+    game.run_systems(30, 8, false);
+    assert!(!is_empty(&game));
+}
