@@ -59,10 +59,10 @@ use ::big_space::prelude::{CellCoord, Grid, GridDirtyTick, Stationary};
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
-use bevy_math::{DVec3, IVec3, Vec3};
+use bevy_math::{DVec3, Vec3};
 use bevy_transform::components::Transform;
 
-use crate::chunk::{Chunk, chunk_transform};
+use crate::chunk::{Chunk, chunk_place, chunk_transform};
 use crate::schedule::MarchlessSystems;
 use crate::terrain::{Terrain, TerrainVolume};
 
@@ -90,7 +90,7 @@ fn place_new_chunk(
     let Ok((volume, grid, can_sleep)) = terrains.get(chunk.terrain) else { return };
     let Some(settings) = volume.settings() else { return };
     let mut entity = commands.entity(added.entity);
-    let place = place(chunk.position, settings, grid);
+    let place = place(chunk, settings, grid);
     if can_sleep {
         entity.try_insert((place, Stationary));
     } else {
@@ -158,7 +158,7 @@ fn place_again(
 ) {
     let Some(settings) = volume.settings() else { return };
     for (entity, chunk, cell, transform) in chunks.iter_many(children) {
-        let place = place(chunk.position, settings, grid);
+        let place = place(chunk, settings, grid);
         if (cell, transform) != (Some(&place.0), &place.1) {
             commands.entity(entity).try_remove::<Stationary>().try_insert(place);
         }
@@ -169,12 +169,12 @@ fn place_again(
 ///
 /// Up to 2²⁹ voxels from the origin, the corner and the cell's middle are exact in `f64`. Only the offset is rounded,
 /// to an `f32`.
-fn place(position: IVec3, settings: &Terrain, grid: &Grid) -> (CellCoord, Transform) {
-    let corner = position.as_dvec3() * f64::from(settings.chunk_cells) * f64::from(settings.voxel_size);
+fn place(chunk: &Chunk, settings: &Terrain, grid: &Grid) -> (CellCoord, Transform) {
+    let (corner, size) = chunk_place(chunk.key(), settings.chunk_cells, settings.voxel_size);
     let edge = f64::from(grid.cell_edge_length());
     let [x, y, z] = (corner / edge).round().to_array().map(|v| v as GridPrecision);
     let cell = CellCoord::new(x, y, z);
     let offset: DVec3 = corner - grid.cell_to_float(&cell);
-    let transform = Transform::from_translation(offset.as_vec3()).with_scale(Vec3::splat(settings.voxel_size));
+    let transform = Transform::from_translation(offset.as_vec3()).with_scale(Vec3::splat(size));
     (cell, transform)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bevy_camera::primitives::Aabb;
 use bevy_camera::visibility::{NoAutoAabb, Visibility};
 use bevy_ecs::prelude::*;
-use bevy_math::{IVec3, UVec3, Vec3};
+use bevy_math::{DVec3, IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
 use marchless::{LeafKey, MeshBuffer};
@@ -106,10 +106,16 @@ pub(crate) fn new_chunk(terrain: Entity, key: ChunkKey, cells: u32, voxel_size: 
 }
 
 /// The transform from a chunk's own space, in voxels of its level, to the terrain's.
-pub(crate) fn chunk_transform(ChunkKey { level, position }: ChunkKey, cells: u32, voxel_size: f32) -> Transform {
-    let size = voxel_size * f32::from(1u8 << level.min(7));
-    let corner = IVec3::from(position).as_dvec3() * f64::from(cells) * f64::from(size);
+pub(crate) fn chunk_transform(key: ChunkKey, cells: u32, voxel_size: f32) -> Transform {
+    let (corner, size) = chunk_place(key, cells, voxel_size);
     Transform::from_translation(corner.as_vec3()).with_scale(Vec3::splat(size))
+}
+
+/// A chunk's lowest corner in the terrain's space, and the size of a voxel of its level. `voxel_size`: that of the finest
+/// one.
+pub(crate) fn chunk_place(ChunkKey { level, position }: ChunkKey, cells: u32, voxel_size: f32) -> (DVec3, f32) {
+    let size = voxel_size * f32::from(1u8 << level.min(7));
+    (IVec3::from(position).as_dvec3() * f64::from(cells) * f64::from(size), size)
 }
 
 /// The bounding box of a whole chunk, in voxels.

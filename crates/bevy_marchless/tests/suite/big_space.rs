@@ -1,6 +1,6 @@
 //! Chunks in the cells of a big space: results at the origin and at ten million voxels are equal bit for bit.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::common::*;
@@ -56,7 +56,8 @@ fn chunks_are_in_their_cells(
         let cell = cell.expect("a cell from the first update on");
         let edge = f64::from(grid.cell_edge_length());
         let settings = volume.settings().expect("good settings");
-        let corner = chunk.position.as_dvec3() * f64::from(settings.chunk_cells) * f64::from(settings.voxel_size);
+        let cells = f64::from(settings.chunk_cells << chunk.level);
+        let corner = chunk.position.as_dvec3() * cells * f64::from(settings.voxel_size);
         let within = transform.translation.as_dvec3();
         assert!(within.abs().max_element() <= 0.5 * edge, "{cell:?} and {within}");
         assert!((grid.cell_to_float(cell) + within).distance(corner) < 1e-7 * edge, "{cell:?} and {within}");
@@ -90,13 +91,14 @@ fn cell_of(offset: IVec3) -> CellCoord {
     CellCoord::ZERO + cell
 }
 
-/// All drawn chunks: by position relative to `offset`, the place relative to the floating origin, bit for bit, and the
-/// mesh.
-fn drawn(app: &mut App, offset: IVec3) -> BTreeMap<[i32; 3], ([u32; 12], Arc<MeshBuffer>)> {
+/// All drawn chunks: by level and position relative to `offset`, the place relative to the floating origin, bit for bit,
+/// and the mesh.
+fn drawn(app: &mut App, offset: IVec3) -> BTreeMap<(u8, [i32; 3]), ([u32; 12], Arc<MeshBuffer>)> {
     let mut chunks = app.world_mut().query::<(&Chunk, &GlobalTransform, &ChunkGeometry)>();
     let drawn = chunks.iter(app.world()).map(|(chunk, global, geometry)| {
         let place = global.affine().to_cols_array().map(f32::to_bits);
-        ((chunk.position - offset).to_array(), (place, geometry.mesh.clone()))
+        let position = chunk.position - (offset >> i32::from(chunk.level));
+        ((chunk.level, position.to_array()), (place, geometry.mesh.clone()))
     });
     drawn.collect()
 }
@@ -157,12 +159,12 @@ fn ten_million_voxels_away_everything_is_the_same() {
         app.update();
     }
     let moved = drawn(&mut near, IVec3::ZERO);
-    assert_eq!(f32::from_bits(moved[&[0; 3]].0[9]), -3.0 * EDGE);
+    assert_eq!(f32::from_bits(moved[&(0, [0; 3])].0[9]), -3.0 * EDGE);
     assert_eq!(moved, drawn(&mut far, FAR));
 }
 
-#[test]
-fn a_viewer_loads_what_is_around_it() {
+/// A viewer loads what is around it, and returns the number of levels that it sees.
+fn follow(levels: u8) -> usize {
     let world = |offset: IVec3| {
         let origin = (offset * CELLS).as_dvec3();
         let waves = move |p: [f64; 3]| {
@@ -170,15 +172,15 @@ fn a_viewer_loads_what_is_around_it() {
             p.y - 6.0 * (p.x * 0.1).sin() * (p.z * 0.07).cos()
         };
         let mut app = space_app(false);
-        let terrain = Terrain::endless(waves).with_chunk_cells(CELLS as u32);
+        let terrain = Terrain::endless(waves).with_chunk_cells(CELLS as u32).with_levels(levels);
         let (terrain, viewer) = spawn(&mut app, terrain, EDGE, cell_of(offset));
-        app.world_mut().entity_mut(viewer).insert(TerrainViewer::new(50.0));
+        app.world_mut().entity_mut(viewer).insert(TerrainViewer::new(50.0 * f32::from(levels)));
         (app, terrain, viewer)
     };
     let (mut near, mut far) = (world(IVec3::ZERO), world(FAR));
     let mut former = BTreeMap::new();
     // At its own place, within the same cell, and in another one.
-    for step in [0.0, 300.0, EDGE] {
+    for step in [0.0, 800.0, EDGE] {
         for (app, terrain, viewer) in [&mut near, &mut far] {
             app.world_mut().get_mut::<Transform>(*viewer).expect("it has a place").translation.x += step;
             // The terrain follows as soon as the new place has been propagated.
@@ -192,6 +194,17 @@ fn a_viewer_loads_what_is_around_it() {
         former = here;
     }
     assert!(near.0.world().get::<CellCoord>(near.2).expect("it has a cell").x > 0, "it went to another cell");
+    former.keys().map(|(level, _)| level).collect::<BTreeSet<_>>().len()
+}
+
+#[test]
+fn a_viewer_loads_what_is_around_it() {
+    assert_eq!(follow(1), 1);
+}
+
+#[test]
+fn a_viewer_sees_levels_of_detail() {
+    assert!(follow(3) > 1);
 }
 
 #[test]
