@@ -116,6 +116,7 @@ pub mod cell;
 mod grid;
 mod lattice;
 mod levels;
+mod material;
 mod math;
 mod mesher;
 mod query;
@@ -135,6 +136,7 @@ pub use grid::{
 };
 pub use lattice::{Region, Samples, SamplesError, Shape, ShapeError};
 pub use levels::{LeafBlock, LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelSource, LevelViewer};
+pub use material::MaterialSet;
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
 pub use mesher::{

@@ -8,7 +8,8 @@ use std::alloc::System;
 
 use fastrand::Rng;
 use marchless::{
-    Block, DualSettings, Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight,
+    Block, DualSettings, Grid, GridChunk, MaterialSet, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology,
+    Weight,
 };
 
 thread_local! {
@@ -77,8 +78,11 @@ fn mesh_all_dual<W: Weight>(fields: &[(Shape, Vec<W>, Vec<u8>)], mesher: &mut Me
         let plain = Samples::new(*shape, weights).expect("one weight a sample");
         let with_materials = plain.with_materials(materials).expect("one material a sample");
         for samples in [plain, with_materials, with_materials.padded()] {
-            for smoothing in [0, 1] {
-                let settings = DualSettings { isovalue: 0.25, smoothing, ..DualSettings::default() };
+            let none = MaterialSet::EMPTY;
+            for (smoothing, sharp, crease) in
+                [(0, none, None), (1, none, None), (0, none.with(1), None), (0, MaterialSet::ALL, Some(0.5))]
+            {
+                let settings = DualSettings { isovalue: 0.25, smoothing, sharp, crease, ..DualSettings::default() };
                 mesher.mesh_dual(samples, &settings, out).expect("the shapes are large enough");
                 assert!(!out.is_empty());
             }

@@ -9,11 +9,12 @@ use super::{BitGrid, BitMesher, BitsError};
 use crate::{
     buffer::MeshBuffer,
     lattice::Shape,
+    material::MaterialSet,
     mesher::MeshError,
     simd::{Backend, dispatch_words},
 };
 use planes::FillPlanes;
-use selection::{MaterialSet, Selection};
+use selection::Selection;
 
 /// A grid of one material for each lattice point, in 2 to 8 planes of bits, for 4 to 256 materials: bit `k` of a
 /// point's material is its bit in plane `k`.

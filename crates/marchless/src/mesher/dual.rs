@@ -13,16 +13,22 @@
 //! chunk, a choice between two diagonals can be made in integers, and one of the diagonals of each quad always gives two
 //! triangles of positive area (`quads`).
 //!
+//! Vertices of sharp materials lie where the planes at their crossings have them (`sharp`, `quadric`), and get copies
+//! where the normals break (`crease`). With smoothing and with creases, vertices and quads are kept until all are known.
+//!
 //! Dual methods go back to Sarah F. F. Gibson, "Constrained Elastic Surface Nets" (1998), and to Tao Ju, Frank Losasso,
 //! Scott Schaefer and Joe Warren, "Dual Contouring of Hermite Data" (2002). A vertex for each loop comes from Gregory M.
 //! Nielson, "Dual Marching Cubes" (2004).
 
 mod cells;
+mod crease;
 mod pipeline;
 mod place;
 mod plain;
+mod quadric;
 mod quads;
 mod settings;
+mod sharp;
 mod smooth;
 mod table;
 
@@ -36,8 +42,19 @@ use crate::{buffer::MeshBuffer, lattice::Samples, sample::Weight, signs::SlabLay
 /// Vertices lie at multiples of 1/4096 of their cells.
 const STEPS: i32 = 4096;
 
-/// The place of a vertex in its cell, in steps along x, y and z; 1 to 4095 each.
+/// The place of a vertex in its cell, in steps along x, y and z, 1 to 4095 each; then its [`VertexKind`].
 type Offset = [u16; 4];
+
+/// How a vertex is placed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum VertexKind {
+    /// At the mean of its crossings.
+    Smooth,
+    /// By the planes at its crossings, which have about one direction.
+    Sharp,
+    /// By planes of several directions.
+    Crease,
+}
 
 /// Which cells have vertices, and which edges have quads.
 #[derive(Clone, Copy, Debug)]
@@ -52,14 +69,18 @@ struct Extent {
     origin: usize,
     /// The first and the end of the samples from which the edges of the mesh begin, per axis.
     own: [[usize; 2]; 3],
+    /// Whether equally good diagonals alternate. With creases they do not: the triangles around a vertex must not
+    /// depend on where a block begins.
+    alternates: bool,
 }
 
 impl Extent {
-    fn new(layout: &SlabLayout, padding: Option<usize>) -> Self {
+    fn new(layout: &SlabLayout, padding: Option<usize>, alternates: bool) -> Self {
         let size = layout.size;
         let Some(padding) = padding else {
             let cells = size.map(|size| [0, size - 1]);
-            return Self { cells, is_open: true, skips_first: false, origin: 0, own: size.map(|size| [0, size]) };
+            let own = size.map(|size| [0, size]);
+            return Self { cells, is_open: true, skips_first: false, origin: 0, own, alternates };
         };
         Self {
             cells: size.map(|size| [1, size - 2]),
@@ -67,6 +88,7 @@ impl Extent {
             skips_first: padding == 2,
             origin: padding,
             own: size.map(|size| [padding, size - padding]),
+            alternates,
         }
     }
 
@@ -103,11 +125,12 @@ impl Mesher {
     /// surface in a cell, and a quad of two triangles around each crossed edge. Samples without a surface are no error:
     /// `out` is then empty.
     ///
-    /// If the samples are [padded](Samples::padded), the outermost `2 + smoothing` layers on each side are padding. The
-    /// mesh has the quads of all edges that begin at one of the other samples, and positions count from the first of
+    /// If the samples are [padded](Samples::padded), the outermost [`padding`](DualSettings::padding) layers on each
+    /// side are padding: `2 + smoothing`, and one more with creases. The mesh has the quads of all edges that begin at one of the other samples, and positions count from the first of
     /// these. So each edge belongs to one block, and the meshes of blocks whose samples continue each other fit:
     /// together they are one surface, and vertices that several of them have are equal bit for bit, with normals and
-    /// materials. A block has at least `2 + smoothing` samples per axis that are not padding, or one without smoothing.
+    /// materials. A block has at least as many samples per axis that are not padding as it has layers of padding, or one
+    /// without smoothing.
     ///
     /// Without padding, edges with fewer than four cells have no quad. The surface then ends up to one cell before the
     /// border.
@@ -118,7 +141,7 @@ impl Mesher {
     /// sign; all positions and normals are finite on every input. The same samples give the same mesh, bit for bit.
     ///
     /// Not guaranteed: that no two triangles cross, that the mesh of a single block is 2-manifold where its surface leaves
-    /// it, and that smoothed vertices of the same cell lie apart.
+    /// it, and that smoothed or sharp vertices of the same cell lie apart.
     ///
     /// ```
     /// use marchless::{DualSettings, MeshBuffer, MeshReport, Mesher, Samples, Shape};
@@ -138,9 +161,30 @@ impl Mesher {
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     ///
+    /// Materials can keep their creases ([`DualSettings::sharp`], [`DualSettings::crease`]):
+    ///
+    /// ```
+    /// use marchless::{DualSettings, MaterialSet, MeshBuffer, Mesher, Samples, Shape};
+    ///
+    /// // A box between lattice points: 4.6 wide, around the middle of 10³ samples.
+    /// let shape = Shape::cube(10)?;
+    /// let distance = |index: i32| {
+    ///     let [x, y, z] = [index % 10, index / 10 % 10, index / 100].map(|v| (v as f32 - 4.5).abs() - 2.3);
+    ///     x.max(y).max(z)
+    /// };
+    /// let weights: Vec<f32> = (0..1000).map(distance).collect();
+    /// let mut mesh = MeshBuffer::new();
+    /// let settings = DualSettings { sharp: MaterialSet::ALL, crease: Some(0.5), ..DualSettings::default() };
+    /// Mesher::new().mesh_dual(Samples::new(shape, &weights)?, &settings, &mut mesh)?;
+    /// // Each of its eight corners is there three times, once for each side.
+    /// let is_corner = |position: &[f32; 3]| position.iter().all(|v| ((v - 4.5).abs() - 2.3).abs() < 0.001);
+    /// assert_eq!(mesh.positions.iter().filter(|position| is_corner(position)).count(), 24);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`MeshError`] if there is no cell to mesh, the isovalue is not finite, there are more steps of smoothing than 8 or
-    /// than the block allows, or `u32` indices cannot number all vertices. `out` is then empty.
+    /// than the block allows, the crease angle is not one from 0 to π, or `u32` indices cannot number all vertices. `out` is then empty.
     pub fn mesh_dual<W: Weight>(
         &mut self,
         samples: Samples<'_, W>,
@@ -150,7 +194,7 @@ impl Mesher {
         out.clear();
         settings.check()?;
         let smoothing = settings.smoothing;
-        let padding = samples.is_padded().then_some(2 + smoothing);
+        let padding = samples.is_padded().then(|| settings.padding());
         let shape = samples.shape();
         let least = padding.map_or(2, |padding| 2 * padding + 1);
         let smallest = shape.size().into_iter().min().unwrap_or(0);
@@ -161,7 +205,10 @@ impl Mesher {
             && smoothing > 0
             && smallest - 2 * padding < padding
         {
-            return Err(MeshError::Smoothing { found: smoothing, most: most_smoothing(smallest) });
+            return Err(MeshError::Smoothing {
+                found: smoothing,
+                most: most_smoothing(smallest, settings.crease.is_some()),
+            });
         }
         // The mesher itself knows no padding: it reads all samples.
         let whole = Samples::new(shape, samples.weights()).and_then(|whole| match samples.materials() {
@@ -170,10 +217,10 @@ impl Mesher {
         });
         let samples = whole.expect("the slices have not changed");
         let layout = SlabLayout::of(&samples).ok_or(MeshError::TooSmall { shape, least })?;
-        let extent = Extent::new(&layout, padding.map(|padding| padding as usize));
+        let extent = Extent::new(&layout, padding.map(|padding| padding as usize), settings.crease.is_none());
         let backend = *self.backend.get_or_insert_with(Backend::fastest);
-        let meshed =
-            DualJob { samples, layout, extent, settings, pipeline: &mut self.dual, out: &mut *out }.run_on(backend);
+        let pipeline = &mut self.dual;
+        let meshed = DualJob { samples, layout, extent, settings, backend, pipeline, out: &mut *out }.mesh();
         if meshed.is_err() {
             out.clear();
         }
@@ -182,7 +229,7 @@ impl Mesher {
 }
 
 /// The most steps of smoothing for a padded block of this many samples per axis.
-fn most_smoothing(size: u32) -> u32 {
-    // With `k` steps, `size − 2·(2 + k)` samples are the block's own; those of its neighbours suffice for as many.
-    (size / 3).saturating_sub(2)
+fn most_smoothing(size: u32, has_creases: bool) -> u32 {
+    // With `k` layers of padding, `size − 2·k` samples are the block's own; those of its neighbours suffice for as many.
+    (size / 3).saturating_sub(if has_creases { 3 } else { 2 })
 }

@@ -51,14 +51,20 @@ pub enum MeshError {
     /// A leaf with finer neighbours is meshed with another topology than [`Topology::Separated`](crate::Topology).
     #[error("a leaf with finer neighbours can be meshed with Topology::Separated only")]
     LeafTopology,
-    /// There are more steps of smoothing than 8, or than a padded block has samples for: with `k` steps, it needs
-    /// `2 + k` samples per axis that are not padding.
+    /// There are more steps of smoothing than 8, or than a padded block has samples for: with smoothing, it needs as
+    /// many samples per axis that are not padding as it has [layers of padding](crate::DualSettings::padding).
     #[error("at most {most} steps of smoothing are possible here, but there are {found}")]
     Smoothing {
         /// The steps that were given.
         found: u32,
         /// The most steps for these samples.
         most: u32,
+    },
+    /// The crease angle is not one from 0 to π.
+    #[error("the crease angle must be from 0 to π, but it is {found}")]
+    Crease {
+        /// The angle that was given.
+        found: f32,
     },
     /// `u32` indices cannot number all vertices.
     #[error("the surface has at least {found} vertices, more than 32-bit indices can name")]

@@ -5,28 +5,9 @@ use alloc::{vec, vec::Vec};
 
 use crate::{
     bits::BitGrid,
+    material::MaterialSet,
     simd::{Job, Simd},
 };
-
-/// A set of materials, with a bit for each of the 256.
-#[derive(Default)]
-pub(super) struct MaterialSet([u128; 2]);
-
-impl FromIterator<u8> for MaterialSet {
-    fn from_iter<I: IntoIterator<Item = u8>>(materials: I) -> Self {
-        let mut set = Self::default();
-        for material in materials {
-            set.0[usize::from(material / 128)] |= 1 << (material % 128);
-        }
-        set
-    }
-}
-
-impl MaterialSet {
-    const fn contains(&self, material: usize) -> bool {
-        self.0[material / 128] >> (material % 128) & 1 == 1
-    }
-}
 
 /// The number of words that are made at once. The words of all nodes then stay in the cache.
 const BLOCK: usize = 32;
@@ -66,7 +47,7 @@ impl<'a> Selection<'a> {
 /// planes tell these materials apart. Adds the nodes that are missing.
 fn slot_of(set: &MaterialSet, first: usize, planes: usize, nodes: &mut Vec<Node>) -> usize {
     let Some(plane) = planes.checked_sub(1) else {
-        return if set.contains(first) { ONES } else { ZEROS };
+        return if set.contains(first as u8) { ONES } else { ZEROS };
     };
     let where_zero = slot_of(set, first, plane, nodes);
     let where_one = slot_of(set, first + (1 << plane), plane, nodes);

@@ -5,9 +5,12 @@ use alloc::vec::Vec;
 use super::{
     Extent, Offset, STEPS,
     cells::{CellSearch, CellVertices, VertexList},
+    crease::Creases,
     place::{BATCH, Batch, CellSlabs},
+    quadric::Quadric,
     quads::{Quad, QuadSearch, write},
     settings::DualSettings,
+    sharp::Planes,
     smooth::{Smoothing, smooth},
 };
 use crate::{
@@ -31,18 +34,22 @@ pub(in crate::mesher) struct DualPipeline {
     quad_search: QuadSearch,
     /// The vertices of the cells below the present slab of cells, and of that slab.
     cells: [CellVertices; 2],
-    /// The vertices of the present slab of cells; with smoothing, those of all slabs.
+    /// The vertices of the present slab of cells; if vertices are finished together, those of all slabs.
     list: VertexList,
     /// The places of all vertices in their cells.
     offsets: Vec<Offset>,
-    /// With smoothing: each slab of cells with vertices, and the number of its first one.
+    planes: Planes,
+    /// The quadrics of all vertices, if any material is sharp.
+    quadrics: Vec<Quadric>,
+    /// If vertices are finished together: each slab of cells with vertices, and the number of its first one.
     slabs: Vec<(usize, usize)>,
-    /// With smoothing: all quads, and the materials of all vertices.
+    /// If vertices are finished together: all quads, and the materials of all vertices.
     quads: Vec<Quad>,
     materials: Vec<u8>,
     smoothing: Smoothing,
-    /// With smoothing: the number of each vertex among those of the mesh.
+    /// If vertices are finished together: the number of each vertex among those of the mesh.
     numbers: Vec<u32>,
+    creases: Creases,
 }
 
 impl DualPipeline {
@@ -54,17 +61,21 @@ impl DualPipeline {
             cells: [CellVertices::new(), CellVertices::new()],
             list: VertexList::new(),
             offsets: Vec::new(),
+            planes: Planes::new(),
+            quadrics: Vec::new(),
             slabs: Vec::new(),
             quads: Vec::new(),
             materials: Vec::new(),
             smoothing: Smoothing::new(),
             numbers: Vec::new(),
+            creases: Creases::new(),
         }
     }
 
     fn clear(&mut self) {
         self.list.len = 0;
         self.offsets.clear();
+        self.quadrics.clear();
         self.slabs.clear();
         self.quads.clear();
         self.materials.clear();
@@ -78,34 +89,35 @@ pub(super) struct DualJob<'a, W> {
     pub(super) layout: SlabLayout,
     pub(super) extent: Extent,
     pub(super) settings: &'a DualSettings,
+    pub(super) backend: Backend,
     pub(super) pipeline: &'a mut DualPipeline,
     pub(super) out: &'a mut MeshBuffer,
 }
 
 impl<W: Weight> DualJob<'_, W> {
-    /// Meshes the volume with `backend`.
-    pub(super) fn run_on(self, backend: Backend) -> Result<(), MeshError> {
-        W::call::<RunOn>((backend, self))
+    /// Meshes the volume with its backend.
+    pub(super) fn mesh(self) -> Result<(), MeshError> {
+        W::call::<Mesh>(self)
     }
 }
 
-/// [`DualJob::run_on`], by type of weight.
-struct RunOn;
+/// [`DualJob::mesh`], by type of weight.
+struct Mesh;
 
-impl PerWeight for RunOn {
-    type Arguments<'a, W: Sealed> = (Backend, DualJob<'a, W>);
+impl PerWeight for Mesh {
+    type Arguments<'a, W: Sealed> = DualJob<'a, W>;
     type Output = Result<(), MeshError>;
 
-    fn of_i8((backend, job): (Backend, DualJob<'_, i8>)) -> Self::Output {
-        dispatch(backend, job)
+    fn of_i8(job: DualJob<'_, i8>) -> Self::Output {
+        dispatch(job.backend, job)
     }
 
-    fn of_i16((backend, job): (Backend, DualJob<'_, i16>)) -> Self::Output {
-        dispatch(backend, job)
+    fn of_i16(job: DualJob<'_, i16>) -> Self::Output {
+        dispatch(job.backend, job)
     }
 
-    fn of_f32((backend, job): (Backend, DualJob<'_, f32>)) -> Self::Output {
-        dispatch(backend, job)
+    fn of_f32(job: DualJob<'_, f32>) -> Self::Output {
+        dispatch(job.backend, job)
     }
 }
 
@@ -135,8 +147,8 @@ impl<W: Weight> Job for DualJob<'_, W> {
                 }
             }
         }
-        if self.settings.smoothing > 0 {
-            self.finish_smooth(&mut batch);
+        if self.is_deferred() {
+            self.finish(&mut batch)?;
         }
         batch.widen(self.extent.origin, self.out);
         Ok(())
@@ -148,15 +160,27 @@ impl<'a, W: Weight> DualJob<'a, W> {
     /// edges between both slabs.
     #[inline(always)]
     fn add_slab<S: Simd>(&mut self, z: usize, batch: &mut Batch<W>) -> Result<(), MeshError> {
-        let is_smooth = self.settings.smoothing > 0;
+        let is_deferred = self.is_deferred();
         let slabs = self.cell_slabs(z);
         let Self { extent, pipeline, out, layout, .. } = self;
-        let DualPipeline { signs, search, quad_search, cells, list, offsets, slabs: starts, quads, materials, .. } =
-            &mut **pipeline;
+        let DualPipeline {
+            signs,
+            search,
+            quad_search,
+            cells,
+            list,
+            offsets,
+            planes,
+            quadrics,
+            slabs: starts,
+            quads,
+            materials,
+            ..
+        } = &mut **pipeline;
         let [low, high] = signs.pair();
         let signs = signs.all();
         cells.swap(0, 1);
-        if is_smooth {
+        if is_deferred {
             starts.push((z, list.len));
         } else {
             list.len = 0;
@@ -172,13 +196,24 @@ impl<'a, W: Weight> DualJob<'a, W> {
             batch.gather(&slabs, list, range.clone());
             batch.place(&slabs, list, range.clone());
             batch.append_offsets(range.len(), offsets);
+            let placed = &mut offsets[first + start - listed..];
+            let materials = if is_deferred { &mut *materials } else { &mut out.materials };
             if slabs.edges.materials.is_some() {
-                let placed = &offsets[first + start - listed..];
-                let materials = if is_smooth { &mut *materials } else { &mut out.materials };
-                materials
-                    .extend(range.clone().zip(placed).map(|(vertex, &offset)| material(&slabs, list, vertex, offset)));
+                let at_means = range.clone().zip(&*placed);
+                materials.extend(at_means.map(|(vertex, &offset)| material(&slabs, list, vertex, offset)));
             }
-            if !is_smooth {
+            let sharp = &self.settings.sharp;
+            if !sharp.is_empty() {
+                let own = &materials[materials.len().saturating_sub(range.len())..];
+                let is_sharp = |i: usize| sharp.contains(own.get(i).copied().unwrap_or_default());
+                if (0..range.len()).any(is_sharp) {
+                    let range = range.clone();
+                    batch.sharpen(self.backend, &slabs, list, range, planes, is_sharp, quadrics, placed);
+                } else {
+                    quadrics.resize(quadrics.len() + range.len(), Quadric::default());
+                }
+            }
+            if !is_deferred {
                 batch.append(&slabs, list, range, self.settings.normals, out);
             }
         }
@@ -188,26 +223,41 @@ impl<'a, W: Weight> DualJob<'a, W> {
         let rows = layout.words;
         let signs = low.signs();
         let along_y = [&signs[..signs.len() - rows], &signs[rows..]];
-        if is_smooth {
+        if is_deferred {
             quad_search.find::<S, 0>(layout, extent, z, [signs, low.next()], cells, |quad| quads.push(quad));
             quad_search.find::<S, 1>(layout, extent, z, along_y, cells, |quad| quads.push(quad));
             quad_search.find::<S, 2>(layout, extent, z, [signs, high.signs()], cells, |quad| quads.push(quad));
         } else {
             let indices = &mut out.indices;
             let (x_edges, y_edges, z_edges) = ([signs, low.next()], along_y, [signs, high.signs()]);
-            quad_search.find::<S, 0>(layout, extent, z, x_edges, cells, |quad| write::<0>(&quad, offsets, indices));
-            quad_search.find::<S, 1>(layout, extent, z, y_edges, cells, |quad| write::<1>(&quad, offsets, indices));
-            quad_search.find::<S, 2>(layout, extent, z, z_edges, cells, |quad| write::<2>(&quad, offsets, indices));
+            quad_search
+                .find::<S, 0>(layout, extent, z, x_edges, cells, |quad| write::<0>(&quad, offsets, quadrics, indices));
+            quad_search
+                .find::<S, 1>(layout, extent, z, y_edges, cells, |quad| write::<1>(&quad, offsets, quadrics, indices));
+            quad_search
+                .find::<S, 2>(layout, extent, z, z_edges, cells, |quad| write::<2>(&quad, offsets, quadrics, indices));
         }
         Ok(())
     }
 
-    /// Smooths all vertices, and writes those of the mesh and the triangles.
+    /// Whether vertices are finished together, when all are known: with smoothing and with creases.
+    const fn is_deferred(&self) -> bool {
+        self.settings.smoothing > 0 || self.settings.crease.is_some()
+    }
+
+    /// Smooths all vertices, finds creases, and writes the vertices and triangles of the mesh.
     #[inline(always)]
-    fn finish_smooth(&mut self, batch: &mut Batch<W>) {
-        let DualPipeline { list, offsets, slabs: starts, quads, materials, smoothing, numbers, .. } =
-            &mut *self.pipeline;
+    fn finish(&mut self, batch: &mut Batch<W>) -> Result<(), MeshError> {
+        let DualPipeline {
+            list, offsets, quadrics, slabs: starts, quads, materials, smoothing, numbers, creases, ..
+        } = &mut *self.pipeline;
         smooth(self.settings.smoothing, quads, offsets, smoothing);
+        let cosine = self.settings.crease_cosine();
+        if let Some(cosine) = cosine {
+            creases.find(cosine, quads, offsets, quadrics);
+        } else {
+            creases.clear();
+        }
 
         // Number the vertices of the mesh, and move them together.
         numbers.clear();
@@ -230,6 +280,9 @@ impl<'a, W: Weight> DualJob<'a, W> {
             (list.x[count], list.y[count]) = (list.x[vertex], list.y[vertex]);
             (list.edges[count], list.cases[count]) = (list.edges[vertex], list.cases[vertex]);
             offsets[count] = offsets[vertex];
+            if let Some(&quadric) = quadrics.get(vertex) {
+                quadrics[count] = quadric;
+            }
             if let Some(&material) = materials.get(vertex) {
                 materials[count] = material;
             }
@@ -242,12 +295,16 @@ impl<'a, W: Weight> DualJob<'a, W> {
         offsets.truncate(count);
         materials.truncate(count);
         self.out.materials.extend_from_slice(materials);
-        for quad in quads.iter_mut().filter(|quad| quad.is_own) {
-            quad.vertices = quad.vertices.map(|vertex| numbers[vertex as usize]);
-            match quad.axis {
-                0 => write::<0>(quad, offsets, &mut self.out.indices),
-                1 => write::<1>(quad, offsets, &mut self.out.indices),
-                _ => write::<2>(quad, offsets, &mut self.out.indices),
+        if cosine.is_some() {
+            let found = creases.number(numbers, count);
+            if found > u64::from(u32::MAX) {
+                return Err(MeshError::TooManyVertices { found });
+            }
+            creases.write_triangles(numbers, &mut self.out.indices);
+        } else {
+            for quad in quads.iter_mut().filter(|quad| quad.is_own) {
+                quad.vertices = quad.vertices.map(|vertex| numbers[vertex as usize]);
+                self.out.indices.extend_from_slice(&quad.any_triangles(offsets, quadrics));
             }
         }
 
@@ -266,6 +323,8 @@ impl<'a, W: Weight> DualJob<'a, W> {
                 batch.append(&slabs, list, range, self.settings.normals, self.out);
             }
         }
+        self.pipeline.creases.write_normals(&self.pipeline.numbers, self.out);
+        Ok(())
     }
 
     /// What the vertices between slab `z` and the next one are made from.

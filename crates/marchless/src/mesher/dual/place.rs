@@ -7,7 +7,7 @@
 use alloc::vec::Vec;
 use core::{mem::MaybeUninit, ops::Range};
 
-use super::{Offset, STEPS, cells::VertexList, plain};
+use super::{Offset, STEPS, VertexKind, cells::VertexList, plain};
 use crate::{
     buffer::MeshBuffer,
     math::sqrt,
@@ -39,13 +39,13 @@ pub(super) struct CellSlabs<'a, W> {
 pub(super) struct Batch<W: Weight> {
     /// For each of the four corners at low x: the sample before it along x, it, and the two after it. Corners 0, 2, 4
     /// and 6.
-    rows: [([W::Left; BATCH], [W::Right; BATCH]); 4],
+    pub(super) rows: [([W::Left; BATCH], [W::Right; BATCH]); 4],
     /// The two samples below the cell along y and the two above it, at low z; then the same at high z.
-    y_sides: [[W::Pair; BATCH]; 4],
+    pub(super) y_sides: [[W::Pair; BATCH]; 4],
     /// The two samples below the cell along z and the two above it, at low y; then the same at high y.
-    z_sides: [[W::Pair; BATCH]; 4],
+    pub(super) z_sides: [[W::Pair; BATCH]; 4],
     /// The offset of each vertex in its cell, in steps.
-    offsets: [[f32; BATCH]; 3],
+    pub(super) offsets: [[f32; BATCH]; 3],
     /// The bounds of all vertices made, counted from the first sample.
     bounds: VertexBounds,
 }
@@ -180,7 +180,7 @@ impl<W: Weight> Batch<W> {
     pub(super) fn append_offsets(&self, count: usize, offsets: &mut Vec<Offset>) {
         let count = count.min(BATCH);
         let [x, y, z] = &self.offsets;
-        offsets.extend((0..count).map(|i| [whole(x[i]), whole(y[i]), whole(z[i]), 0]));
+        offsets.extend((0..count).map(|i| [whole(x[i]), whole(y[i]), whole(z[i]), VertexKind::Smooth as u16]));
     }
 
     /// Appends the positions and normals of the gathered and placed vertices to `out`.
@@ -383,7 +383,7 @@ pub(super) fn trilinear(corners: &[f32; 8], x: f32, y: f32, z: f32) -> f32 {
 }
 
 /// The corners of each edge.
-const CORNERS: [[usize; 2]; 12] = {
+pub(super) const CORNERS: [[usize; 2]; 12] = {
     let (mut corners, mut edge) = ([[0; 2]; 12], 0);
     while edge < 12 {
         let [low, high] = crate::cell::Edge::ALL[edge].corners();
@@ -405,13 +405,13 @@ pub(super) fn rounded_mean(sum: f32, count: f32) -> f32 {
 
 /// Moves a coordinate off the faces of the cell, into which the crossings of a vertex can all lie at an open border.
 #[inline(always)]
-const fn within_cell(steps: f32) -> f32 {
+pub(super) const fn within_cell(steps: f32) -> f32 {
     let steps = if steps > 1.0 { steps } else { 1.0 };
     if steps < (STEPS - 1) as f32 { steps } else { (STEPS - 1) as f32 }
 }
 
 /// A whole number of steps, 0 to 4096.
 #[inline(always)]
-const fn whole(steps: f32) -> u16 {
+pub(super) const fn whole(steps: f32) -> u16 {
     (steps + 8_388_608.0).to_bits() as u16
 }

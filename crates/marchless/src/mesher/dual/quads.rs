@@ -3,8 +3,9 @@
 use alloc::vec::Vec;
 
 use super::{
-    Extent, Offset,
+    Extent, Offset, STEPS, VertexKind,
     cells::{CellVertices, bits_between, place},
+    quadric::Quadric,
 };
 use crate::{
     signs::SlabLayout,
@@ -23,7 +24,8 @@ pub(super) struct Quad {
     pub(super) axis: u8,
     /// Whether the edge's low end is inside.
     pub(super) low_inside: bool,
-    /// Whether the coordinates of the edge's low end have an odd sum.
+    /// Whether the second of two equally good diagonals is taken: the coordinates of the edge's low end have an odd
+    /// sum, and diagonals alternate.
     pub(super) is_odd: bool,
     /// Whether the quad is part of the mesh, and not only of what its vertices are smoothed by.
     pub(super) is_own: bool,
@@ -33,15 +35,17 @@ impl Quad {
     /// The two triangles.
     ///
     /// Of the two diagonals it takes the one whose smaller triangle is larger, as seen along the edge: then both
-    /// triangles face the edge. With vertices strictly within their cells, one diagonal always has such triangles.
+    /// triangles face the edge. With vertices strictly within their cells, one diagonal always has such triangles. If
+    /// both have, and a vertex lies on a crease, the planes of the vertices choose. `quadrics`: those of all vertices;
+    /// none if no vertex is sharp.
     #[inline(always)]
-    pub(super) fn triangles<const AXIS: usize>(&self, offsets: &[Offset]) -> [u32; 6] {
+    pub(super) fn triangles<const AXIS: usize>(&self, offsets: &[Offset], quadrics: &[Quadric]) -> [u32; 6] {
         let [a, b, c, d] = self.vertices;
         let flat = |vertex: u32, [u, v]: [i32; 2]| {
             let offset = offsets[vertex as usize];
             [i32::from(offset[(AXIS + 1) % 3]) + u, i32::from(offset[(AXIS + 2) % 3]) + v]
         };
-        let far = -super::STEPS;
+        let far = -STEPS;
         let places = [flat(a, [far, far]), flat(b, [0, far]), flat(c, [0, 0]), flat(d, [far, 0])];
         // The sum of a diagonal's two areas is that of the quad, so the smaller one is largest where they are most
         // alike.
@@ -51,12 +55,70 @@ impl Quad {
         let (abc, acd, abd) = (cross(to_b, to_c), cross(to_c, to_d), cross(to_b, to_d));
         let whole = abc + acd;
         let (first, second) = ((abc - acd).abs(), (2 * abd - whole).abs());
-        let is_second = (second < first) | ((second == first) & self.is_odd);
+        let mut is_second = (second < first) | ((second == first) & self.is_odd);
+        if !quadrics.is_empty() && abc.min(acd).min(abd).min(whole - abd) > 0 {
+            is_second = self.follows_crease(is_second, offsets, quadrics);
+        }
         // A table, since no predictor knows the diagonal.
         let order = &ORDERS[usize::from(self.low_inside) << 1 | usize::from(is_second)];
         order.map(|corner| self.vertices[usize::from(corner % 4)])
     }
+
+    /// [`Self::triangles`], for an axis that is not known yet.
+    pub(super) fn any_triangles(&self, offsets: &[Offset], quadrics: &[Quadric]) -> [u32; 6] {
+        match self.axis {
+            0 => self.triangles::<0>(offsets, quadrics),
+            1 => self.triangles::<1>(offsets, quadrics),
+            _ => self.triangles::<2>(offsets, quadrics),
+        }
+    }
+
+    /// The places of the four vertices, in steps from the edge's low end.
+    pub(super) fn places(&self, offsets: &[Offset]) -> [[i32; 3]; 4] {
+        let lowest = self.lowest();
+        [0, 1, 2, 3].map(|corner: usize| {
+            let offset = offsets[self.vertices[corner] as usize];
+            [0, 1, 2].map(|axis: usize| i32::from(offset[axis]) + lowest[corner][axis])
+        })
+    }
+
+    /// The lowest corners of the four cells, in steps from the edge's low end.
+    fn lowest(&self) -> [[i32; 3]; 4] {
+        let (u, v) = ((usize::from(self.axis) + 1) % 3, (usize::from(self.axis) + 2) % 3);
+        [[-STEPS, -STEPS], [0, -STEPS], [0, 0], [-STEPS, 0]].map(|[at_u, at_v]| {
+            let mut lowest = [0; 3];
+            (lowest[u], lowest[v]) = (at_u, at_v);
+            lowest
+        })
+    }
+
+    /// Whether to take the second diagonal, of two that are possible: the one whose middle is nearer to the planes of
+    /// the four vertices, if one is clearly nearer. Otherwise, and without a crease, it stays as it `is_second`.
+    #[inline(never)]
+    fn follows_crease(&self, is_second: bool, offsets: &[Offset], quadrics: &[Quadric]) -> bool {
+        let vertices = self.vertices.map(|vertex| vertex as usize);
+        if vertices.iter().all(|&vertex| offsets[vertex][3] != VertexKind::Crease as u16) {
+            return is_second;
+        }
+        let (places, lowest) = (self.places(offsets), self.lowest());
+        let error = |from: usize, to: usize| {
+            let mut error = 0.0;
+            for (vertex, lowest) in vertices.into_iter().zip(lowest) {
+                let point = [0, 1, 2].map(|axis: usize| {
+                    let doubled = places[from][axis] + places[to][axis] - 2 * lowest[axis] - STEPS;
+                    doubled as f32 / (2 * STEPS) as f32
+                });
+                error += quadrics[vertex].error(point);
+            }
+            error
+        };
+        let (first, second) = (error(0, 2), error(1, 3));
+        if is_second { first + CLEARLY >= second } else { second + CLEARLY < first }
+    }
 }
+
+/// Squared distances to planes that differ by less than this do not choose a diagonal: a thirty-second of a cell, once.
+const CLEARLY: f32 = 1.0 / 1024.0;
 
 /// The corners of both triangles, counter-clockwise as seen from outside: where the edge's low end is outside, with the
 /// first and with the second diagonal; then where it is inside.
@@ -116,7 +178,7 @@ impl QuadSearch {
                         vertices: vertices_around::<AXIS>(layout, cells, x_edge, y),
                         axis: AXIS as u8,
                         low_inside,
-                        is_odd: (x_edge as usize + y as usize + z + 3 * extent.origin) % 2 == 1,
+                        is_odd: extent.alternates && (x_edge as usize + y as usize + z + 3 * extent.origin) % 2 == 1,
                         is_own: is_own_row && extent.is_own(0, x_edge as usize),
                     });
                 }
@@ -144,6 +206,6 @@ fn vertices_around<const AXIS: usize>(
 
 /// Appends the triangles of a quad.
 #[inline(always)]
-pub(super) fn write<const AXIS: usize>(quad: &Quad, offsets: &[Offset], indices: &mut Vec<u32>) {
-    indices.extend_from_slice(&quad.triangles::<AXIS>(offsets));
+pub(super) fn write<const AXIS: usize>(quad: &Quad, offsets: &[Offset], quadrics: &[Quadric], indices: &mut Vec<u32>) {
+    indices.extend_from_slice(&quad.triangles::<AXIS>(offsets, quadrics));
 }

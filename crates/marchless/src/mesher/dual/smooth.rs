@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{Offset, STEPS, quads::Quad};
+use super::{Offset, STEPS, VertexKind, quads::Quad};
 
 /// Scratch memory: for each vertex, the sum of its neighbours' places relative to its own cell, and their number.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ impl Smoothing {
 }
 
 /// Moves each vertex half the way to the mean of its neighbours, in each of `steps` steps. It stays in its cell; halves
-/// are rounded up. Neighbours are the vertices at the other ends of sides of quads. A side of two quads counts twice.
+/// are rounded up. Sharp vertices stay where they are. Neighbours are the vertices at the other ends of sides of quads. A side of two quads counts twice.
 pub(super) fn smooth(steps: u32, quads: &[Quad], offsets: &mut [Offset], Smoothing(sums): &mut Smoothing) {
     for _ in 0..steps {
         sums.clear();
@@ -38,7 +38,7 @@ pub(super) fn smooth(steps: u32, quads: &[Quad], offsets: &mut [Offset], Smoothi
             }
         }
         for (offset, &[x, y, z, count]) in offsets.iter_mut().zip(&*sums) {
-            if count == 0 {
+            if count == 0 || offset[3] != VertexKind::Smooth as u16 {
                 continue;
             }
             for (at, sum) in offset.iter_mut().zip([x, y, z]) {

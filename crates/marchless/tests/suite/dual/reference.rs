@@ -4,8 +4,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use marchless::Weight;
 use marchless::cell::{CaseIndex, Corner, Edge, Face};
+use marchless::{MaterialSet, Weight};
+
+use super::planes::{Sharp, follows_crease};
+use crate::support::exact::{cross, dot, minus};
 
 /// Offsets within a cell are multiples of 1/4096.
 pub(crate) const STEPS: i64 = 4096;
@@ -26,6 +29,8 @@ pub(crate) struct Volume<'a, W> {
     /// Whether the outermost samples are padding.
     pub(crate) padded: bool,
     pub(crate) smoothing: u32,
+    pub(crate) sharp: MaterialSet,
+    pub(crate) crease: Option<f32>,
 }
 
 /// A mesh of whole numbers.
@@ -38,6 +43,8 @@ pub(crate) struct Mesh {
     pub(crate) vertices: Vec<CellVertex>,
     pub(crate) materials: Vec<u8>,
     pub(crate) indices: Vec<u32>,
+    /// The normals of sharp vertices, if creases show.
+    pub(crate) normals: BTreeMap<usize, [u32; 3]>,
 }
 
 /// The loops of a case, each with the inside to its left as seen from outside; ordered by their lowest edges.
@@ -84,7 +91,7 @@ pub(crate) fn opposite(face: Face) -> Face {
 }
 
 impl<W: Weight> Volume<'_, W> {
-    fn index(&self, at: [u32; 3]) -> usize {
+    pub(crate) fn index(&self, at: [u32; 3]) -> usize {
         let [nx, ny, _] = self.size.map(|n| n as usize);
         let [x, y, z] = at.map(|v| v as usize);
         x + nx * (y + ny * z)
@@ -116,7 +123,7 @@ impl<W: Weight> Volume<'_, W> {
 
     /// Whether a cell takes the loops of its complement: it and a neighbour both have all crossings of their common
     /// face in one loop.
-    fn is_complemented(&self, cell: [i64; 3]) -> bool {
+    pub(crate) fn is_complemented(&self, cell: [i64; 3]) -> bool {
         whole_faces(self.case(cell)).iter().any(|&face| {
             let mut neighbour = cell;
             neighbour[face.axis()] += if face.is_high() { 1 } else { -1 };
@@ -146,13 +153,18 @@ impl<W: Weight> Volume<'_, W> {
     /// Whether a quad is part of the mesh, and not only of what its vertices are smoothed by.
     fn is_own(&self, cell: [i64; 3], edge: Edge) -> bool {
         let low = Self::corner(cell, edge.corners()[0]);
-        let layers = 2 + self.smoothing;
+        let layers = self.layers();
         !self.padded || (0..3).all(|axis| (layers..self.size[axis] - layers).contains(&low[axis]))
+    }
+
+    /// The layers of padding on each side.
+    fn layers(&self) -> u32 {
+        2 + self.smoothing + u32::from(self.crease.is_some())
     }
 
     /// The lattice point that positions count from, on each axis.
     fn origin(&self) -> i64 {
-        if self.padded { 2 + i64::from(self.smoothing) } else { 0 }
+        if self.padded { i64::from(self.layers()) } else { 0 }
     }
 
     fn vertices_of(&self, cell: [i64; 3]) -> Vec<CellVertex> {
@@ -177,7 +189,7 @@ impl<W: Weight> Volume<'_, W> {
     }
 
     /// The multiple of 2⁻¹⁴ of an edge at which the surface crosses it.
-    fn crossing(&self, cell: [i64; 3], edge: Edge) -> i64 {
+    pub(crate) fn crossing(&self, cell: [i64; 3], edge: Edge) -> i64 {
         let [a, b] = edge.corners().map(|corner| self.weights[self.index(Self::corner(cell, corner))].to_voxels());
         let size = (b * W::SCALE - a * W::SCALE).abs();
         let fraction = if (1e-30..1e30).contains(&size) {
@@ -222,15 +234,19 @@ impl<W: Weight> Volume<'_, W> {
         let cells = |axis: usize| 0..i64::from(self.size[axis]) - 1;
         let cells: Vec<[i64; 3]> =
             cells(2).flat_map(|z| cells(1).flat_map(move |y| cells(0).map(move |x| [x, y, z]))).collect();
-        let (mut offsets, mut of_cell, mut places, mut mesh) =
-            (Vec::new(), BTreeMap::new(), Vec::new(), Mesh::default());
+        let (mut offsets, mut sharp) = (Vec::new(), Vec::new());
+        let (mut of_cell, mut places, mut mesh) = (BTreeMap::new(), Vec::new(), Mesh::default());
         for &cell in cells.iter().filter(|&&cell| self.has_vertices(cell)) {
             for vertex in self.vertices_of(cell) {
                 for &edge in &vertex.crossings {
                     of_cell.insert((cell, edge), offsets.len());
                 }
-                offsets.push(self.mean(cell, &vertex));
-                mesh.materials.push(self.material(cell, &vertex, self.mean(cell, &vertex)));
+                let mean = self.mean(cell, &vertex);
+                let material = self.material(cell, &vertex, mean);
+                let planes = self.sharp.contains(material).then(|| self.sharp(cell, &vertex, mean));
+                offsets.push(planes.as_ref().map_or(mean, |planes| planes.offset));
+                sharp.push(planes);
+                mesh.materials.push(material);
                 mesh.vertices.push(vertex);
                 places.push(cell);
             }
@@ -238,22 +254,48 @@ impl<W: Weight> Volume<'_, W> {
 
         let quads = self.quads(&of_cell);
         for _ in 0..self.smoothing {
-            offsets = smoothed(&offsets, &places, &quads);
+            let moved = smoothed(&offsets, &places, &quads);
+            offsets = (0..offsets.len()).map(|at| if sharp[at].is_some() { offsets[at] } else { moved[at] }).collect();
         }
         let place = |vertex: usize| [0, 1, 2].map(|axis| STEPS * places[vertex][axis] + offsets[vertex][axis]);
-        let mut indices = Vec::new();
-        for quad in quads.iter().filter(|quad| quad.own) {
-            indices.extend(quad.triangles(quad.vertices.map(place)).as_flattened());
+        let mut triangles = Vec::new();
+        for quad in &quads {
+            let middles = quad.vertices.map(|vertex| places[vertex].map(|v| STEPS * v + STEPS / 2));
+            let planes = quad.vertices.map(|vertex| sharp[vertex].as_ref());
+            let both = quad.triangles(quad.vertices.map(place), middles, planes);
+            triangles.extend(both.map(|corners| Triangle::new(corners, place, quad.own)));
         }
 
         // Vertices without triangles are left out.
-        let used: BTreeSet<usize> = indices.iter().copied().collect();
-        let numbers: BTreeMap<usize, u32> = used.iter().copied().zip(0..).collect();
-        mesh.positions = used.iter().map(|&vertex| place(vertex).map(|v| v - STEPS * self.origin())).collect();
-        mesh.cells = used.iter().map(|&vertex| places[vertex].map(|v| v as u32)).collect();
-        mesh.materials = used.iter().map(|&vertex| mesh.materials[vertex]).collect();
-        mesh.vertices = used.iter().map(|&vertex| mesh.vertices[vertex].clone()).collect();
-        mesh.indices = indices.iter().map(|vertex| numbers[vertex]).collect();
+        let own = || triangles.iter().filter(|triangle| triangle.own);
+        let used: BTreeSet<usize> = own().flat_map(|triangle| triangle.corners).collect();
+        let numbers: BTreeMap<usize, usize> = used.iter().copied().zip(0..).collect();
+        let mut vertices: Vec<usize> = used.iter().copied().collect();
+        let mut copies = BTreeMap::new();
+        let mut around: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (at, triangle) in triangles.iter().enumerate() {
+            triangle.corners.iter().for_each(|&vertex| around.entry(vertex).or_default().push(at));
+        }
+        for &vertex in used.iter().filter(|&&vertex| self.crease.is_some() && sharp[vertex].is_some()) {
+            let fans = fans(&around[&vertex], &triangles, self.crease.unwrap_or_default());
+            let own = fans.into_iter().filter(|fan| fan.iter().any(|&triangle| triangles[triangle].own));
+            for (index, fan) in own.enumerate() {
+                let number = if index == 0 { numbers[&vertex] } else { vertices.len() };
+                if index > 0 {
+                    vertices.push(vertex);
+                }
+                mesh.normals.insert(number, mean_normal(&fan, &triangles));
+                copies.extend(fan.into_iter().map(|triangle| ((triangle, vertex), number)));
+            }
+        }
+        for (at, triangle) in triangles.iter().enumerate().filter(|(_, triangle)| triangle.own) {
+            let number = |vertex| copies.get(&(at, vertex)).copied().unwrap_or(numbers[&vertex]);
+            mesh.indices.extend(triangle.corners.map(|vertex| number(vertex) as u32));
+        }
+        mesh.positions = vertices.iter().map(|&vertex| place(vertex).map(|v| v - STEPS * self.origin())).collect();
+        mesh.cells = vertices.iter().map(|&vertex| places[vertex].map(|v| v as u32)).collect();
+        mesh.materials = vertices.iter().map(|&vertex| mesh.materials[vertex]).collect();
+        mesh.vertices = vertices.iter().map(|&vertex| mesh.vertices[vertex].clone()).collect();
         mesh
     }
 
@@ -274,8 +316,9 @@ impl<W: Weight> Volume<'_, W> {
                     if self.has_quad(cell, edge) {
                         let vertices = Self::around(cell, edge).map(|place| of_cell[&place]);
                         let (outward, own) = (self.is_inside(low), self.is_own(cell, edge));
-                        let low = low.map(|v| i64::from(v) - self.origin());
-                        quads.push(Quad { vertices, low, axis, outward, own });
+                        let sum: i64 = low.iter().map(|&v| i64::from(v) - self.origin()).sum();
+                        let odd = self.crease.is_none() && sum.rem_euclid(2) == 1;
+                        quads.push(Quad { vertices, odd, axis, outward, own });
                     }
                 }
             }
@@ -288,8 +331,8 @@ impl<W: Weight> Volume<'_, W> {
 struct Quad {
     /// In the order of [`Volume::around`].
     vertices: [usize; 4],
-    /// The edge's low end, from the first sample that is not padding.
-    low: [i64; 3],
+    /// Whether the edge's low end has an odd sum of coordinates, and equally good diagonals alternate.
+    odd: bool,
     axis: usize,
     /// Whether the surface's outside is in the direction of the axis.
     outward: bool,
@@ -297,8 +340,9 @@ struct Quad {
 }
 
 impl Quad {
-    /// Two triangles: of both diagonals, the one whose smaller triangle is larger as seen along the edge.
-    fn triangles(&self, places: [[i64; 3]; 4]) -> [[usize; 3]; 2] {
+    /// Two triangles: of both diagonals, the one whose smaller triangle is larger as seen along the edge; at a crease,
+    /// if both triangles of both diagonals face the edge, the one that the planes choose.
+    fn triangles(&self, places: [[i64; 3]; 4], middles: [[i64; 3]; 4], sharp: [Option<&Sharp>; 4]) -> [[usize; 3]; 2] {
         let [a, b, c, d] = self.vertices;
         let flat = places.map(|place| [place[(self.axis + 1) % 3], place[(self.axis + 2) % 3]]);
         let area = |[p, q, r]: [usize; 3]| {
@@ -308,8 +352,10 @@ impl Quad {
         let first = area([0, 1, 2]).min(area([0, 2, 3]));
         let second = area([0, 1, 3]).min(area([1, 2, 3]));
         assert!(first.max(second) > 0, "one diagonal always has two triangles that face the edge");
-        let odd = self.low.iter().sum::<i64>().rem_euclid(2) == 1;
-        let is_second = second > first || second == first && odd;
+        let mut is_second = second > first || second == first && self.odd;
+        if first.min(second) > 0 && sharp.iter().flatten().any(|sharp| sharp.is_crease) {
+            is_second = follows_crease(is_second, places, middles, sharp);
+        }
         match (is_second, self.outward) {
             (false, true) => [[a, b, c], [a, c, d]],
             (true, true) => [[b, c, d], [b, d, a]],
@@ -317,6 +363,52 @@ impl Quad {
             (true, false) => [[d, c, b], [d, b, a]],
         }
     }
+}
+
+/// A triangle, and twice its area along its normal.
+struct Triangle {
+    corners: [usize; 3],
+    normal: [i64; 3],
+    own: bool,
+}
+
+impl Triangle {
+    fn new(corners: [usize; 3], place: impl Fn(usize) -> [i64; 3], own: bool) -> Self {
+        let [a, b, c] = corners.map(place);
+        Self { corners, normal: cross(minus(b, a), minus(c, a)), own }
+    }
+
+    fn length(&self) -> f64 {
+        (dot(self.normal, self.normal) as f64).sqrt()
+    }
+}
+
+/// The runs of triangles around a vertex between creases.
+fn fans(around: &[usize], triangles: &[Triangle], crease: f32) -> Vec<Vec<usize>> {
+    let mut fans: Vec<Vec<usize>> = Vec::new();
+    for &triangle in around {
+        let this = &triangles[triangle];
+        let goes_on = |&other: &usize| {
+            let other = &triangles[other];
+            let common = this.corners.iter().filter(|corner| other.corners.contains(corner)).count();
+            let least = f64::from(crease).cos() * (this.length() * other.length());
+            common == 2 && dot(this.normal, other.normal) as f64 >= least
+        };
+        let (joined, apart): (Vec<_>, Vec<_>) = fans.into_iter().partition(|fan| fan.iter().any(goes_on));
+        let mut fan: Vec<usize> = joined.into_iter().flatten().chain([triangle]).collect();
+        fan.sort();
+        fans = apart;
+        fans.push(fan);
+    }
+    fans.sort();
+    fans
+}
+
+fn mean_normal(fan: &[usize], triangles: &[Triangle]) -> [u32; 3] {
+    let sum = [0, 1, 2].map(|axis| fan.iter().map(|&triangle| triangles[triangle].normal[axis]).sum::<i64>());
+    let [x, y, z] = (if sum == [0; 3] { triangles[fan[0]].normal } else { sum }).map(|v| v as f64);
+    let length = (x * x + y * y + z * z).sqrt();
+    [x, y, z].map(|v| ((v / length) as f32).to_bits())
 }
 
 /// One step of smoothing: each vertex moves half the way to the mean of the vertices that sides of quads join it to, a
