@@ -10,10 +10,10 @@
 //! - For fields without a surface, reading all samples once (xor) is close to the lower bound for any mesher.
 //!
 //! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the
-//! default, and so is the dual mesher. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread
+//! default, and so is the dual mesher, with means and with all vertices sharp. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread
 //! per processor. Up to 128³, these alone take about a minute:
 //!
-//! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear|, dual)?$|MeshReport)'`
+//! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear|, dual|, sharp)?$|MeshReport)'`
 //!
 //! Terrains of 1³ to 50³ cells are those of William Svoboda, "Improving the Marching Cubes Algorithm for Use in
 //! Deformable 3D Terrain", table 1. The table repeats the paper's times (C#, an Intel Core i5 of 3.5 GHz, no shared
@@ -33,7 +33,7 @@ use core::{hint::black_box, time::Duration};
 use std::{env, process::ExitCode};
 
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, measurement::WallTime};
-use marchless::{DualSettings, MeshSettings, Topology};
+use marchless::{DualSettings, MaterialSet, MeshSettings, Topology};
 use marchless_benches::Field;
 
 use case::Case;
@@ -102,6 +102,9 @@ fn fields(criterion: &mut Criterion, results: &mut Results, case: &Case) {
     results.measure(&mut group, case, Subject::Isosurface, || peers::isosurface(case));
     results.measure(&mut group, case, Subject::Isomesh, || peers::isomesh(case));
     results.check_same_triangles(case, Subject::Ours(f32::NAME), Subject::Isomesh);
+    if matches!(case.field, Field::Terrain | Field::Caves) && [35, 64].contains(&case.size) {
+        results.measure(&mut group, case, Subject::IsomeshDual, || peers::isomesh_dual(case));
+    }
     group.finish();
 }
 
@@ -130,6 +133,9 @@ fn ours<W: Measured>(group: &mut BenchmarkGroup<'_, WallTime>, results: &mut Res
             case.ours::<W>(MeshSettings { topology: Topology::Trilinear, ..MeshSettings::default() })
         });
         results.measure(group, case, Subject::Dual(W::NAME), || case.dual::<W>(DualSettings::default()));
+        results.measure(group, case, Subject::Sharp(W::NAME), || {
+            case.dual::<W>(DualSettings { sharp: MaterialSet::ALL, ..DualSettings::default() })
+        });
     }
     if matches!(case.field, Field::Empty | Field::Solid) {
         results.measure(group, case, Subject::Reading(W::NAME), || {

@@ -88,6 +88,38 @@ pub(crate) fn isomesh(case: &Case) -> impl FnMut() -> usize + use<> {
     }
 }
 
+/// isomesh's manifold dual contouring, which asks for samples and gradients at points in any order.
+pub(crate) fn isomesh_dual(case: &Case) -> impl FnMut() -> usize + use<> {
+    let samples = AnyOrder(InOrder::new(case));
+    let shape = RuntimeShape3::new([case.size - 2; 3]).expect("the sizes are small");
+    let mut mesher = isomesh::manifold_dual_contouring::ManifoldDualContouring::<f32>::new();
+    let mut mesh = isomesh::MeshBuffer::<f32>::new();
+    move || {
+        mesh.reset();
+        isomesh::extractor::Extractor::extract_into(&mut mesher, &samples, &shape, [0.0; 3], 1.0, &mut mesh)
+            .expect("there are cells to mesh");
+        core::hint::black_box(&mesh).triangle_count()
+    }
+}
+
+/// The samples at the nearest lattice points.
+struct AnyOrder(InOrder);
+
+impl Sdf for AnyOrder {
+    type Scalar = f32;
+
+    #[inline]
+    fn sample(&self, position: [f32; 3]) -> f32 {
+        let [x, y, z] = position.map(|v| (v + 1.5) as usize);
+        self.0.padded[x + self.0.size * (y + self.0.size * z)]
+    }
+
+    #[inline]
+    fn gradient(&self, position: [f32; 3]) -> [f32; 3] {
+        self.0.gradient_near(position)
+    }
+}
+
 /// isosurface's marching cubes with normals.
 pub(crate) fn isosurface(case: &Case) -> impl FnMut() -> usize + use<> {
     let samples = InOrder::new(case);

@@ -19,6 +19,8 @@ pub(crate) enum Subject {
     Trilinear(&'static str),
     /// Our dual mesher with normals, on weights of this name.
     Dual(&'static str),
+    /// The same with all vertices sharp, on weights of this name.
+    Sharp(&'static str),
     /// `MeshReport` on our mesh of the `f32` samples.
     Report,
     /// Ours without normals, on `f32`.
@@ -31,6 +33,8 @@ pub(crate) enum Subject {
     NetsI8,
     Isosurface,
     Isomesh,
+    /// isomesh's manifold dual contouring.
+    IsomeshDual,
     /// No mesher: the weights of this name are only read.
     Reading(&'static str),
 }
@@ -41,6 +45,7 @@ impl fmt::Display for Subject {
             Self::Ours(weight) => write!(f, "marchless {weight}"),
             Self::Trilinear(weight) => write!(f, "marchless {weight}, Trilinear"),
             Self::Dual(weight) => write!(f, "marchless {weight}, dual"),
+            Self::Sharp(weight) => write!(f, "marchless {weight}, sharp"),
             Self::Report => f.write_str("MeshReport"),
             Self::Bare => f.write_str("marchless f32 without normals"),
             Self::Nets => f.write_str("fast-surface-nets f32"),
@@ -48,6 +53,7 @@ impl fmt::Display for Subject {
             Self::NetsI8 => f.write_str("fast-surface-nets i8"),
             Self::Isosurface => f.write_str("isosurface"),
             Self::Isomesh => f.write_str("isomesh"),
+            Self::IsomeshDual => f.write_str("isomesh, dual contouring"),
             Self::Reading(weight) => write!(f, "reading {weight}"),
         }
     }

@@ -26,7 +26,7 @@ use std::{
 use fields::Field;
 use mesh::Mesh;
 use peers::Peer;
-use tally::Tally;
+use tally::{Flaws, Tally};
 
 /// Fields of each kind.
 const PER_KIND: usize = 16;
@@ -80,9 +80,10 @@ fn judge_all(fields: &[Field], folder: Option<&Path>) -> io::Result<(Vec<Tally>,
     for (index, peer) in Peer::ALL.into_iter().enumerate() {
         let mut tally = Tally::new(peer.name);
         for field in fields {
-            let verdict = tally.judge(field, peer.mesh(field).as_ref());
-            if let (Err(flaws), true) = (verdict, index < Peer::OURS) {
-                unclean.push(format!("{}, {}: {flaws}", peer.name, field.file_name()));
+            match tally.judge(field, peer.mesh(field).as_ref()) {
+                Err(Flaws::Harmless(flaws)) if index < Peer::FLAWLESS => unclean.push(told(peer, field, &flaws)),
+                Err(Flaws::Serious(flaws)) if index < Peer::OURS => unclean.push(told(peer, field, &flaws)),
+                _ => (),
             }
         }
         tallies.push(tally);
@@ -97,6 +98,10 @@ fn judge_all(fields: &[Field], folder: Option<&Path>) -> io::Result<(Vec<Tally>,
         tallies.push(tally);
     }
     Ok((tallies, unclean))
+}
+
+fn told(peer: Peer, field: &Field, flaws: &str) -> String {
+    format!("{}, {}: {flaws}", peer.name, field.file_name())
 }
 
 /// The folders in a folder, by name.

@@ -21,7 +21,7 @@ use isomesh::{
     marching_cubes::{FaceAmbiguity, InteriorAmbiguity},
 };
 use isosurface::source::Source;
-use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology};
+use marchless::{DualSettings, MaterialSet, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology};
 use transvoxel::prelude::{Block, FieldCaching, GenericMeshBuilder, TransitionSide, extract_from_field};
 
 use crate::{fields::Field, mesh::Mesh};
@@ -36,9 +36,12 @@ pub(crate) struct Peer {
 
 impl Peer {
     /// The first [`Self::OURS`] are ours.
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self { name: "marchless, `Separated`", extract: |field| marchless(field, Topology::Separated) },
         Self { name: "marchless, `Trilinear`", extract: |field| marchless(field, Topology::Trilinear) },
+        Self { name: "marchless, dual", extract: |field| dual(field, 0, MaterialSet::EMPTY) },
+        Self { name: "marchless, dual, smoothed twice", extract: |field| dual(field, 2, MaterialSet::EMPTY) },
+        Self { name: "marchless, dual, sharp", extract: |field| dual(field, 0, MaterialSet::ALL) },
         Self { name: "transvoxel 2.0.0, regular cells", extract: transvoxel },
         Self { name: "isosurface 0.0.4, marching cubes", extract: isosurface },
         Self { name: "mcubes 0.1.7", extract: mcubes },
@@ -57,7 +60,9 @@ impl Peer {
         },
         Self { name: "fast-surface-nets 0.2.1", extract: nets },
     ];
-    pub(crate) const OURS: usize = 2;
+    pub(crate) const OURS: usize = 5;
+    /// Of ours, the first are free of any flaw. Dual meshes may have triangles that cross, and vertices that meet.
+    pub(crate) const FLAWLESS: usize = 2;
 
     /// Its mesh of a field; `None` if it refuses or panics.
     pub(crate) fn mesh(self, field: &Field) -> Option<Mesh> {
@@ -69,6 +74,14 @@ fn marchless(field: &Field, topology: Topology) -> Option<Mesh> {
     let samples = Samples::new(Shape::cube(field.size as u32).ok()?, &field.samples).ok()?;
     let mut mesh = MeshBuffer::new();
     Mesher::new().mesh(samples, &MeshSettings { topology, ..MeshSettings::default() }, &mut mesh).ok()?;
+    Some(Mesh { positions: mesh.positions, indices: mesh.indices })
+}
+
+fn dual(field: &Field, smoothing: u32, sharp: MaterialSet) -> Option<Mesh> {
+    let samples = Samples::new(Shape::cube(field.size as u32).ok()?, &field.samples).ok()?;
+    let mut mesh = MeshBuffer::new();
+    let settings = DualSettings { smoothing, sharp, ..DualSettings::default() };
+    Mesher::new().mesh_dual(samples, &settings, &mut mesh).ok()?;
     Some(Mesh { positions: mesh.positions, indices: mesh.indices })
 }
 

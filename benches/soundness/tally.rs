@@ -23,6 +23,13 @@ const FLAWS: [Flaw; 8] = [
     ("non-finite vertices", |report| report.non_finite_vertices),
 ];
 
+/// What is wrong with a mesh.
+pub(crate) enum Flaws {
+    /// At most triangles that cross and vertices that meet.
+    Harmless(String),
+    Serious(String),
+}
+
 /// The judged meshes of all fields by one mesher.
 pub(crate) struct Tally {
     name: String,
@@ -57,13 +64,13 @@ impl Tally {
     ///
     /// # Errors
     /// A description of its flaws.
-    pub(crate) fn judge(&mut self, field: &Field, mesh: Option<&Mesh>) -> Result<(), String> {
+    pub(crate) fn judge(&mut self, field: &Field, mesh: Option<&Mesh>) -> Result<(), Flaws> {
         self.fields += 1;
         let verdict = match mesh.filter(|mesh| !mesh.indices.is_empty() || !field.has_surface()) {
             Some(mesh) => self.examine(mesh),
             None => {
                 self.none += 1;
-                Err("no mesh".to_owned())
+                Err(Flaws::Serious("no mesh".to_owned()))
             }
         };
         if verdict.is_err() {
@@ -73,7 +80,7 @@ impl Tally {
         verdict
     }
 
-    fn examine(&mut self, mesh: &Mesh) -> Result<(), String> {
+    fn examine(&mut self, mesh: &Mesh) -> Result<(), Flaws> {
         let report = MeshReport::new(&mesh.positions, &mesh.indices);
         self.triangles += report.triangles;
         self.zero_area_triangles += zero_area_triangles(&report);
@@ -81,7 +88,13 @@ impl Tally {
             *fields += usize::from(count(&report) > 0);
             *all += count(&report);
         }
-        if report.is_closed() && report.is_clean() { Ok(()) } else { Err(report.to_string()) }
+        if report.is_closed() && report.is_clean() {
+            return Ok(());
+        }
+        let mut serious = report.clone();
+        (serious.crossing_triangles, serious.duplicate_vertices) = (0, 0);
+        let kind = if serious.is_closed() && serious.is_clean() { Flaws::Harmless } else { Flaws::Serious };
+        Err(kind(report.to_string()))
     }
 }
 
