@@ -43,13 +43,18 @@ impl Quadric {
         dot(point, along) - 2.0 * dot(self.vector, point) + self.constant
     }
 
+    /// From `start` on, the quadric is least where `matrix · step` is this.
+    #[inline(always)]
+    fn slope(&self, start: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = times(&self.matrix, start);
+        [self.vector[0] - x, self.vector[1] - y, self.vector[2] - z]
+    }
+
     /// The point nearest to `start` of those where the quadric is least, without negligible eigenvalues. `start` if
     /// there are no planes.
     #[inline(always)]
     pub(super) fn least(&self, start: [f32; 3]) -> Least {
-        // From `start` on, the quadric is least where `matrix · step = slope`.
-        let at_start = times(&self.matrix, start);
-        let slope = [0, 1, 2].map(|k: usize| self.vector[k] - at_start[k]);
+        let slope = self.slope(start);
         let jacobi = Jacobi::of(self.matrix).sweep().sweep().sweep().sweep();
         let [x, y, z] = jacobi.diagonal;
         let largest = larger(larger(x, y), z);
@@ -80,8 +85,7 @@ impl Quadric {
         for (k, row) in matrix.iter_mut().enumerate() {
             row[k] = largest / 1024.0;
         }
-        let at_start = times(&self.matrix, start);
-        let slope = [0, 1, 2].map(|k: usize| self.vector[k] - at_start[k]);
+        let slope = self.slope(start);
         let mut kept = [0.0; 3];
         for (&value, vector) in least.values.iter().zip(&least.vectors) {
             let along = if value > 0.0 { dot(*vector, slope) } else { 0.0 };
@@ -195,7 +199,12 @@ fn turned(cosine: f32, sine: f32, low: f32, high: f32) -> [f32; 2] {
 
 #[inline(always)]
 fn turned_vectors(cosine: f32, sine: f32, low: [f32; 3], high: [f32; 3]) -> [[f32; 3]; 2] {
-    let [x, y, z] = [0, 1, 2].map(|k: usize| turned(cosine, sine, low[k], high[k]));
+    // No `map` here: compilers leave it as a call in loops that should run on vectors.
+    let (x, y, z) = (
+        turned(cosine, sine, low[0], high[0]),
+        turned(cosine, sine, low[1], high[1]),
+        turned(cosine, sine, low[2], high[2]),
+    );
     [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
 }
 

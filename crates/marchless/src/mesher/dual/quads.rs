@@ -75,21 +75,23 @@ impl Quad {
 
     /// The places of the four vertices, in steps from the edge's low end.
     pub(super) fn places(&self, offsets: &[Offset]) -> [[i32; 3]; 4] {
-        let lowest = self.lowest();
-        [0, 1, 2, 3].map(|corner: usize| {
-            let offset = offsets[self.vertices[corner] as usize];
-            [0, 1, 2].map(|axis: usize| i32::from(offset[axis]) + lowest[corner][axis])
-        })
+        let mut places = self.lowest();
+        for (place, vertex) in places.iter_mut().zip(self.vertices) {
+            for (at, steps) in place.iter_mut().zip(offsets[vertex as usize]) {
+                *at += i32::from(steps);
+            }
+        }
+        places
     }
 
     /// The lowest corners of the four cells, in steps from the edge's low end.
     fn lowest(&self) -> [[i32; 3]; 4] {
         let (u, v) = ((usize::from(self.axis) + 1) % 3, (usize::from(self.axis) + 2) % 3);
-        [[-STEPS, -STEPS], [0, -STEPS], [0, 0], [-STEPS, 0]].map(|[at_u, at_v]| {
-            let mut lowest = [0; 3];
-            (lowest[u], lowest[v]) = (at_u, at_v);
-            lowest
-        })
+        let mut lowest = [[0; 3]; 4];
+        (lowest[0][u], lowest[0][v]) = (-STEPS, -STEPS);
+        lowest[1][v] = -STEPS;
+        lowest[3][u] = -STEPS;
+        lowest
     }
 
     /// Whether to take the second diagonal, of two that are possible: the one whose middle is nearer to the planes of
@@ -104,11 +106,11 @@ impl Quad {
         let error = |from: usize, to: usize| {
             let mut error = 0.0;
             for (vertex, lowest) in vertices.into_iter().zip(lowest) {
-                let point = [0, 1, 2].map(|axis: usize| {
+                let along = |axis: usize| {
                     let doubled = places[from][axis] + places[to][axis] - 2 * lowest[axis] - STEPS;
                     doubled as f32 / (2 * STEPS) as f32
-                });
-                error += quadrics[vertex].error(point);
+                };
+                error += quadrics[vertex].error([along(0), along(1), along(2)]);
             }
             error
         };

@@ -83,8 +83,9 @@ impl<W: Weight> Volume<'_, W> {
         exists.then(|| self.weights[self.index(at.map(|v| v as u32))].to_voxels() * W::SCALE)
     }
 
-    /// The slope along `axis` at a corner of a cell, by the samples on the near side of a crease.
-    fn slope(&self, cell: [i64; 3], corner: Corner, axis: usize) -> f32 {
+    /// The slope along `axis` at a corner of a cell, by the samples on the near side of a crease; and whether there is no
+    /// crease.
+    fn slope(&self, cell: [i64; 3], corner: Corner, axis: usize) -> (f32, bool) {
         // The differences, all along the axis: to the sample outside the cell, within the cell, beyond it.
         let differences = |axis: usize| {
             let own = [0, 1, 2].map(|k| cell[k] + i64::from(corner.offset()[k]));
@@ -104,11 +105,11 @@ impl<W: Weight> Volume<'_, W> {
         let [outer, inner, far] = differences(axis);
         let bend = (inner - outer).abs();
         if bend <= size / 4.0 {
-            (outer + inner) / 2.0
+            ((outer + inner) / 2.0, true)
         } else if (far - inner).abs() < bend / 8.0 {
-            inner
+            (inner, false)
         } else {
-            outer
+            (outer, false)
         }
     }
 
@@ -126,7 +127,12 @@ impl<W: Weight> Volume<'_, W> {
             });
             let gradient = [0, 1, 2].map(|axis| {
                 let [at_low, at_high] = [low, high].map(|corner| self.slope(cell, corner, axis));
-                if axis == edge.axis() { b - a } else { at_low + (at_high - at_low) * fraction }
+                match (at_low, at_high) {
+                    _ if axis == edge.axis() => b - a,
+                    ((low, true), (_, false)) => low,
+                    ((_, false), (high, true)) => high,
+                    ((low, _), (high, _)) => low + (high - low) * fraction,
+                }
             });
             let squared = dot(gradient, gradient);
             if (1e-30..1e30).contains(&squared) {
