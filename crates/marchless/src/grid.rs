@@ -4,6 +4,7 @@ mod block;
 pub(crate) mod border;
 mod chunk;
 mod chunks;
+mod dirty;
 mod error;
 mod mesh_changes;
 pub(crate) mod occupancy;
@@ -23,7 +24,7 @@ pub use self::pool::SamplePool;
 use crate::buffer::MeshBuffer;
 pub use crate::lattice::MAX_CHUNK_CELLS;
 use crate::lattice::Region;
-use crate::mesher::{MeshError, MeshSettings, Mesher};
+use crate::mesher::{MeshError, MeshMethod, Mesher};
 use crate::sample::{Voxel, Weight};
 use crate::source::Source;
 
@@ -32,19 +33,17 @@ pub const DEFAULT_CHUNK_CELLS: u32 = 32;
 /// The smallest number of cells per axis of a chunk.
 pub const MIN_CHUNK_CELLS: u32 = 8;
 
-/// The most chunk positions that are all marked dirty, absent chunks included. In larger regions, only present chunks
-/// and their neighbours are marked.
-const MAX_MARKED_ABSENT: u128 = 4096;
-
 /// A sparse volume of samples in chunks of `n` cells per axis: the chunk at `c` owns the lattice points
 /// `c·n` to `c·n + n − 1` of each axis.
 ///
 /// A clone shares the samples, and editing one copy does not affect the other. An edit marks chunks *dirty* if their
-/// meshes read a changed sample; they stay dirty until [`Grid::take_dirty`].
+/// meshes read a changed sample; they stay dirty until [`Grid::take_dirty`]. How far meshes read depends on the mesher:
+/// for the dual one, call [`Grid::set_mesh_method`].
 ///
 /// A **bounded** grid has air around it, so its chunks' meshes together are closed: meshes, rays and reports of edits
 /// see its samples intersected with a box half a voxel inside the outermost planes ([`Grid::as_meshed`]). The stored
-/// samples are not clipped, so the bounds may change at any time ([`Grid::set_bounds`]).
+/// samples are not clipped, so the bounds may change at any time ([`Grid::set_bounds`]). The box's walls are flat with
+/// either mesher, and the dual one bevels its edges: within a cell without smoothing, and one cell more with each step.
 ///
 /// ```
 /// use marchless::{Grid, Region, Voxel};
@@ -61,6 +60,8 @@ pub struct Grid<W = i16> {
     bounds: Option<Region>,
     chunks: Chunks<W>,
     dirty: BTreeSet<[i32; 3]>,
+    /// The layers of samples that a chunk's mesh reads below and above its own.
+    margins: [u32; 2],
 }
 
 impl<W: Weight> Grid<W> {
@@ -70,7 +71,8 @@ impl<W: Weight> Grid<W> {
     /// [`GridError::ChunkCells`].
     pub fn new(chunk_cells: u32) -> Result<Self, GridError> {
         check_cells(chunk_cells)?;
-        Ok(Self { cells: chunk_cells, bounds: None, chunks: Chunks::new(), dirty: BTreeSet::new() })
+        let margins = MeshMethod::default().margins();
+        Ok(Self { cells: chunk_cells, bounds: None, chunks: Chunks::new(), dirty: BTreeSet::new(), margins })
     }
 
     /// An empty grid that is bounded to the chunk positions in `chunks`, with air around them.
@@ -87,7 +89,8 @@ impl<W: Weight> Grid<W> {
     /// as air until bounds include them again.
     ///
     /// This marks no chunk dirty. The meshes that change are those of chunks at the old border, at the new border, and
-    /// of chunks that were beyond the old bounds.
+    /// of chunks that were beyond the old bounds. With the dual mesher and more than `chunk_cells − 7` steps of
+    /// smoothing, those of the next layer of chunks inside may change too.
     ///
     /// # Errors
     /// [`GridError::Bounds`] if `bounds` is empty or its lattice points do not fit in `i32`; the grid is then
@@ -298,62 +301,22 @@ impl<W: Weight> Grid<W> {
         NeighbourhoodView { chunks, beyond, cells: self.cells, origin, border: self.border() }
     }
 
-    /// The chunk positions whose block (one point below, two above) reads a point of `changed`, within the bounds.
-    pub fn chunks_affected_by(&self, changed: Region) -> Region {
-        if changed.is_empty() {
-            return Region::new([0; 3], [0; 3]);
-        }
-        let n = i64::from(self.cells);
-        // n·c − 1 < changed.max and n·c + n + 1 ≥ changed.min; the quotients fit.
-        let affected = Region {
-            min: changed.min.map(|v| (i64::from(v) - 2).div_euclid(n) as i32),
-            max: changed.max.map(|v| i64::from(v).div_euclid(n) as i32 + 1),
-        };
-        affected.intersection(&self.limits())
-    }
-
-    /// Marks the chunks dirty whose meshes read a point of `changed`. In a large region, absent chunks without a
-    /// present neighbour are left out, since they have no mesh; the cost is then proportional to the number of present
-    /// chunks.
-    pub fn mark_dirty(&mut self, changed: Region) {
-        let affected = self.chunks_affected_by(changed);
-        if affected.is_empty() {
-            return;
-        }
-        let count = affected.size().into_iter().map(u128::from).product::<u128>();
-        if count <= MAX_MARKED_ABSENT {
-            self.dirty.extend(affected.points());
-            return;
-        }
-        for position in self.chunks.positions_in(affected.grown(1, 1)) {
-            let around = Region::new(position, position).grown(1, 2);
-            self.dirty.extend(around.intersection(&affected).points());
-        }
-    }
-
-    /// The chunks whose meshes are out of date.
-    pub const fn dirty(&self) -> &BTreeSet<[i32; 3]> {
-        &self.dirty
-    }
-
-    /// Returns the chunks whose meshes are out of date, and clears the set.
-    pub fn take_dirty(&mut self) -> BTreeSet<[i32; 3]> {
-        core::mem::take(&mut self.dirty)
-    }
-
     /// Meshes the chunk at `position`. Vertex positions are in cells from its lowest lattice point. To mesh many
     /// chunks, [`NeighbourhoodView::mesh`] is faster, since it reuses its block.
     ///
+    /// The dual mesher makes the quads of all edges that begin at the chunk's own lattice points. With either mesher,
+    /// the meshes of all chunks together are one surface, and in a bounded grid a closed one.
+    ///
     /// # Errors
-    /// As [`Mesher::mesh`]; `out` is then empty.
+    /// As [`NeighbourhoodView::mesh`]; `out` is then empty.
     pub fn mesh_chunk(
         &self,
         position: [i32; 3],
         mesher: &mut Mesher,
-        settings: &MeshSettings,
+        method: impl Into<MeshMethod>,
         out: &mut MeshBuffer,
     ) -> Result<(), MeshError> {
-        self.neighbourhood_view(position).mesh(mesher, &mut Block::new(), settings, out)
+        self.neighbourhood_view(position).mesh(mesher, &mut Block::new(), method, out)
     }
 
     /// The chunk at `position`; `None` if it is absent or beyond the bounds.

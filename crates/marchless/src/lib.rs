@@ -140,7 +140,8 @@ pub use material::MaterialSet;
 #[cfg(feature = "std")]
 pub use mesher::ThreadedMesher;
 pub use mesher::{
-    DualSettings, FinerNeighbours, LeafError, LeafSamples, MeshError, MeshSettings, Mesher, SlabMesher, Topology,
+    DualSettings, FinerNeighbours, LeafError, LeafSamples, MeshError, MeshMethod, MeshSettings, Mesher, SlabMesher,
+    Topology,
 };
 pub use query::RayHit;
 pub use sample::{Voxel, Weight};

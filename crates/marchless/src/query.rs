@@ -37,10 +37,11 @@ pub struct RayHit {
 }
 
 impl<W: Weight> Grid<W> {
-    /// The first triangle of the grid's meshes that a ray hits, from either side; `None` where it hits nothing or is no
-    /// ray.
+    /// The first triangle of the grid's primal meshes that a ray hits, from either side; `None` where it hits nothing or
+    /// is no ray.
     ///
-    /// The triangles are those that [`Grid::mesh_chunk`] makes at the same isovalue (in voxels). `origin`, `direction`
+    /// The triangles are those that [`Grid::mesh_chunk`] makes with the primal mesher at the same isovalue (in voxels).
+    /// Dual meshes have others, which no query of samples alone finds. `origin`, `direction`
     /// and `max_distance` are in lattice units; the direction may have any length but 0, and the distance may be
     /// infinite. A ray along a triangle's plane or through its very edge may count as a hit or as a miss.
     ///
@@ -66,12 +67,31 @@ impl<W: Weight> Grid<W> {
             }
             ray.walk(self.chunk_region(chunk), Cubes::of(1)).find_map(|cell| surface.hit(&ray, cell))
         };
-        let chunks = Cubes::of(self.chunk_cells().into());
         let most = if is_shown_without_chunks(self, isovalue) { MOST_WITHOUT_CHUNKS } else { NEAR };
+        self.walk_chunks(&ray, most, hit)
+    }
+
+    /// Calls `find` with the chunk positions that a ray passes, in order, until it returns something. Positions may be
+    /// left out where no chunk is present at 0 or 1 step along each axis. Lengths and directions are as in
+    /// [`Grid::ray_cast`].
+    #[doc(hidden)]
+    pub fn find_along_ray<T>(
+        &self,
+        origin: [f64; 3],
+        direction: [f64; 3],
+        max_distance: f64,
+        find: impl FnMut([i32; 3]) -> Option<T>,
+    ) -> Option<T> {
+        self.walk_chunks(&Ray::new(origin, direction, max_distance)?, NEAR, find)
+    }
+
+    /// Calls `find` with chunk positions along a ray: with all of them if they are at most `most`.
+    fn walk_chunks<T>(&self, ray: &Ray, most: f64, find: impl FnMut([i32; 3]) -> Option<T>) -> Option<T> {
+        let (limits, chunks) = (self.limits(), Cubes::of(self.chunk_cells().into()));
         if ray.steps(limits, chunks) <= most {
-            return ray.walk(limits, chunks).find_map(hit);
+            return ray.walk(limits, chunks).find_map(find);
         }
-        BoxWalk::new(self.occupancy(), &ray, self.chunk_cells()).find_map(hit)
+        BoxWalk::new(self.occupancy(), ray, self.chunk_cells()).find_map(find)
     }
 
     /// The weight at a position minus the isovalue: its distance from the surface in voxels, negative inside.

@@ -8,8 +8,8 @@ use std::alloc::System;
 
 use fastrand::Rng;
 use marchless::{
-    Block, DualSettings, Grid, GridChunk, MaterialSet, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology,
-    Weight,
+    Block, DualSettings, Grid, GridChunk, MaterialSet, MeshBuffer, MeshMethod, MeshSettings, Mesher, Samples, Shape,
+    Topology, Weight,
 };
 
 thread_local! {
@@ -131,12 +131,15 @@ fn warm_meshing_of_a_chunk_allocates_nothing() {
     }
     let neighbourhood = grid.neighbourhood([0, 0, 0]);
     let (mut mesher, mut block, mut out) = (Mesher::new(), Block::new(), MeshBuffer::new());
-    let mut mesh = || {
-        neighbourhood.mesh(&mut mesher, &mut block, &MeshSettings::default(), &mut out).expect("a chunk can be meshed");
-        assert!(!out.is_empty());
-    };
-    assert_ne!(allocations(&mut mesh), 0, "cold buffers must grow");
-    assert_eq!(allocations(&mut mesh), 0);
+    let dual = DualSettings { smoothing: 3, ..DualSettings::default() };
+    for method in [MeshMethod::default(), dual.into()] {
+        let mut mesh = || {
+            neighbourhood.mesh(&mut mesher, &mut block, method, &mut out).expect("a chunk can be meshed");
+            assert!(!out.is_empty());
+        };
+        assert_ne!(allocations(&mut mesh), 0, "cold buffers must grow");
+        assert_eq!(allocations(&mut mesh), 0);
+    }
 }
 
 /// Besides the samples and the mesh, a mesher keeps the signs of three slabs and the data of one batch of vertices.

@@ -9,7 +9,7 @@ use super::border::{Border, larger, layer_indices};
 use super::{DEFAULT_CHUNK_CELLS, GridChunk, MAX_CHUNK_CELLS};
 use crate::buffer::MeshBuffer;
 use crate::lattice::{Samples, Shape};
-use crate::mesher::{MeshError, MeshSettings, Mesher};
+use crate::mesher::{DualSettings, MeshError, MeshMethod, Mesher};
 use crate::sample::{Voxel, Weight};
 
 /// A snapshot of a chunk and its 26 neighbours: all that its mesh depends on. Later edits do not affect it, and it may
@@ -47,18 +47,26 @@ impl<W: Weight> Neighbourhood<W> {
         self.view().block(isovalue, out);
     }
 
+    /// Calls [`NeighbourhoodView::dual_block`].
+    ///
+    /// # Errors
+    /// As [`MeshMethod::check`]; `out` is then unchanged.
+    pub fn dual_block(&self, settings: &DualSettings, out: &mut Block<W>) -> Result<(), MeshError> {
+        self.view().dual_block(settings, out)
+    }
+
     /// Calls [`NeighbourhoodView::mesh`].
     ///
     /// # Errors
-    /// As [`Mesher::mesh`]; `out` is then empty.
+    /// As [`NeighbourhoodView::mesh`]; `out` is then empty.
     pub fn mesh(
         &self,
         mesher: &mut Mesher,
         block: &mut Block<W>,
-        settings: &MeshSettings,
+        method: impl Into<MeshMethod>,
         out: &mut MeshBuffer,
     ) -> Result<(), MeshError> {
-        self.view().mesh(mesher, block, settings, out)
+        self.view().mesh(mesher, block, method, out)
     }
 }
 
@@ -101,15 +109,39 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         self.beyond >> index & 1 == 1
     }
 
-    /// Gathers the samples that the chunk's mesh at `isovalue` is made from: the chunk's own, one layer below and two
-    /// above. At the border of a bounded grid, they are intersected with the border's box. Allocates nothing once `out`
-    /// has held a block of this size.
+    /// Gathers the samples that the chunk's primal mesh at `isovalue` is made from: the chunk's own, one layer below
+    /// and two above. At the border of a bounded grid, they are intersected with the border's box. Allocates nothing
+    /// once `out` has held a block of this size.
     pub fn block(&self, isovalue: f32, out: &mut Block<W>) {
+        // Margins that the compiler knows let it copy without calls.
+        self.gather([1, 2], isovalue, out);
+    }
+
+    /// Gathers the samples that the chunk's dual mesh is made from: the chunk's own, and `2 + smoothing` layers around
+    /// them. Otherwise as [`block`](Self::block).
+    ///
+    /// # Errors
+    /// As [`MeshMethod::check`]; `out` is then unchanged.
+    pub fn dual_block(&self, settings: &DualSettings, out: &mut Block<W>) -> Result<(), MeshError> {
+        let method = MeshMethod::from(settings);
+        method.check(self.cells)?;
+        self.gather(method.margins().map(|layers| layers as usize), settings.isovalue, out);
+        Ok(())
+    }
+
+    /// Gathers the chunk's samples and those around it: `low` layers below and `high` above, at most as many as a chunk
+    /// has.
+    #[inline(always)]
+    fn gather(&self, [low, high]: [usize; 2], isovalue: f32, out: &mut Block<W>) {
         let n = self.cells as usize;
-        out.resize(self.cells);
+        let size = low + n + high;
+        out.resize(size);
         // The spans of the three neighbours along an axis.
-        let spans =
-            [Span { to: 0, from: n - 1, len: 1 }, Span { to: 1, from: 0, len: n }, Span { to: n + 1, from: 0, len: 2 }];
+        let spans = [
+            Span { to: 0, from: n - low, len: low },
+            Span { to: low, from: 0, len: n },
+            Span { to: low + n, from: 0, len: high },
+        ];
         // Every row is read from three chunks at once, since most of the time is spent waiting for memory.
         for (line, chunks) in self.chunks.as_chunks::<3>().0.iter().enumerate() {
             let [y, z] = [spans[line % 3], spans[line / 3]];
@@ -124,62 +156,70 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
             let strides = samples.map(|samples| usize::from(samples.is_some()));
             for k in 0..z.len {
                 for j in 0..y.len {
-                    let to = (n + 3) * (y.to + j + (n + 3) * (z.to + k));
+                    let to = size * (y.to + j + size * (z.to + k));
                     let from = strides.map(|stride| stride * n * (y.from + j + n * (z.from + k)));
-                    join(&mut out.weights[to..][..n + 3], weights, from);
-                    join(&mut out.materials[to..][..n + 3], materials, from);
+                    join(&mut out.weights[to..][..size], weights, from, [low, high]);
+                    join(&mut out.materials[to..][..size], materials, from, [low, high]);
                 }
             }
         }
+        let origin = self.origin.map(|v| v - low as i64);
         for index in (0..27).filter(|index| self.is_beyond(*index)) {
             let spans = [spans[index % 3], spans[index / 3 % 3], spans[index / 9]];
             out.rows(spans, |[x, y, z], weights, materials| {
                 for (i, (weight, material)) in weights.iter_mut().zip(materials).enumerate() {
-                    let voxel = self.beyond([x + i, y, z], isovalue);
+                    let voxel = self.beyond(origin, [x + i, y, z], isovalue);
                     (*weight, *material) = (voxel.weight, voxel.material);
                 }
             });
         }
-        // The blocks of inner chunks do not reach the samples that are clipped.
-        if let Some(border) = &self.border
-            && self.beyond != 0
-        {
-            out.clip(border, self.origin.map(|v| v - 1), isovalue);
+        if let Some(border) = &self.border {
+            out.clip(border, origin, isovalue);
         }
     }
 
-    /// Meshes the chunk. Vertex positions are in cells from its lowest lattice point. `block` is scratch memory. In a
-    /// uniform neighbourhood, `out` is empty and `block` is not touched.
+    /// Meshes the chunk with the primal or the dual mesher. Vertex positions are in cells from its lowest lattice
+    /// point: 0 to the number of cells with the primal mesher, and from −1 on with the dual one. `block` is scratch
+    /// memory. In a uniform neighbourhood, `out` is empty and `block` is not touched.
     ///
     /// # Errors
-    /// As [`Mesher::mesh`]; `out` is then empty.
+    /// As [`MeshMethod::check`], [`Mesher::mesh`] and [`Mesher::mesh_dual`]; `out` is then empty.
     pub fn mesh(
         &self,
         mesher: &mut Mesher,
         block: &mut Block<W>,
-        settings: &MeshSettings,
+        method: impl Into<MeshMethod>,
         out: &mut MeshBuffer,
     ) -> Result<(), MeshError> {
-        if self.is_uniform() && settings.isovalue.is_finite() {
-            out.clear();
+        let method = method.into();
+        out.clear();
+        method.check(self.cells)?;
+        if self.is_uniform() {
             return Ok(());
         }
-        self.block(settings.isovalue, block);
-        mesher.mesh(block.samples(), settings, out)
+        match method {
+            MeshMethod::Primal(settings) => {
+                self.block(settings.isovalue, block);
+                mesher.mesh(block.samples(), &settings, out)
+            }
+            MeshMethod::Dual(settings) => {
+                self.dual_block(&settings, block)?;
+                mesher.mesh_dual(block.samples(), &settings, out)
+            }
+        }
     }
 
-    /// The voxel at a point of the block that lies beyond the bounds.
-    fn beyond(&self, point: [usize; 3], isovalue: f32) -> Voxel<W> {
+    /// The voxel at a point beyond the bounds. `origin`: the block's lowest lattice point, from which `point` counts.
+    fn beyond(&self, origin: [i64; 3], point: [usize; 3], isovalue: f32) -> Voxel<W> {
         match &self.border {
-            Some(border) => {
-                border.beyond(core::array::from_fn(|axis| self.origin[axis] - 1 + point[axis] as i64), isovalue)
-            }
+            Some(border) => border.beyond(array::from_fn(|axis| origin[axis] + point[axis] as i64), isovalue),
             None => Voxel::AIR,
         }
     }
 }
 
-/// The samples of one chunk and of the padding around it, `n + 3` per axis. The caller keeps and reuses a block.
+/// The samples of one chunk and of the padding around it: `n + 3` per axis for the primal mesher, and
+/// `n + 4 + 2·smoothing` for the dual one. The caller keeps and reuses a block.
 #[derive(Clone, Debug)]
 pub struct Block<W = i16> {
     shape: Shape,
@@ -212,9 +252,9 @@ impl<W: Weight> Block<W> {
         }
     }
 
-    /// Resizes the block for a chunk of `cells` cells per axis.
-    fn resize(&mut self, cells: u32) {
-        self.shape = Shape::cube(cells + 3).expect("a chunk's cells are few");
+    /// Resizes the block to `size` samples per axis.
+    fn resize(&mut self, size: usize) {
+        self.shape = Shape::cube(size as u32).expect("a chunk's samples are few");
         self.weights.resize(self.shape.len(), W::OUTSIDE);
         self.materials.resize(self.shape.len(), 0);
     }
@@ -250,16 +290,16 @@ struct Span {
     len: usize,
 }
 
-/// Joins a row of three chunks: the last sample of the first, all of the second, the first two of the third.
-fn join<T: Copy>(row: &mut [T], [before, own, after]: [&[T]; 3], from: [usize; 3]) {
-    let n = row.len() - 3;
-    row[0] = before[from[0] + n - 1];
+/// Joins a row of three chunks: the last `low` samples of the first, all of the second, the first `high` of the third.
+#[inline(always)]
+fn join<T: Copy>(row: &mut [T], [before, own, after]: [&[T]; 3], from: [usize; 3], [low, high]: [usize; 2]) {
+    let n = row.len() - low - high;
+    row[..low].copy_from_slice(&before[from[0] + n - low..][..low]);
     let own = &own[from[1]..][..n];
     match own.as_array::<{ DEFAULT_CHUNK_CELLS as usize }>() {
         // A length that the compiler knows needs no call to `memcpy`.
-        Some(own) => *row[1..].first_chunk_mut().expect("three longer") = *own,
-        None => row[1..=n].copy_from_slice(own),
+        Some(own) => *row[low..].first_chunk_mut().expect("longer by the margins") = *own,
+        None => row[low..][..n].copy_from_slice(own),
     }
-    row[n + 1] = after[from[2]];
-    row[n + 2] = after[from[2] + 1];
+    row[low + n..].copy_from_slice(&after[from[2]..][..high]);
 }

@@ -5,6 +5,9 @@
 //! topology](Topology::Trilinear), which reads the weights at the corners of cells. So a changed sample shows only near
 //! the surface before or after the change. Signs are words here, one bit a sample of a row, so a few operations test a
 //! whole row.
+//!
+//! A vertex of the dual mesher depends on all samples within some steps of the corners of its cell: one fewer than the
+//! [margin](MeshMethod::margins), since the mesh of a chunk has vertices one cell below it.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec;
@@ -15,45 +18,47 @@ use super::border::Border;
 use super::{Grid, GridChunk};
 use crate::bits::BitGrid;
 use crate::lattice::{Region, Samples, Shape};
-use crate::mesher::{MeshSettings, Topology};
+use crate::mesher::{MeshMethod, Topology};
 use crate::sample::Weight;
 
 /// The largest isovalue, either way, in voxels, that is handled at the border. Farther from 0, adding half a voxel may
 /// not change an `f32`.
 const MAX_BORDER_ISOVALUE: f32 = 1e6;
-/// The margin of samples that is read around the changed ones: the neighbours of their neighbours.
-const REACH: u32 = 2;
 
 impl<W: Weight> Grid<W> {
     /// The chunks whose meshes a change may have altered, out of the [chunks affected by](Self::chunks_affected_by) it.
     /// In the others, every changed sample is too far from the surface, before and after the change, to show.
     ///
     /// `changed`: a box around the changed samples. `before`: every chunk that holds a changed sample, as it was before
-    /// ([`GridChunk::AIR`] if it was absent). `settings`: the settings of the meshes.
+    /// ([`GridChunk::AIR`] if it was absent). `method`: how the meshes are made.
     ///
-    /// `None` for cases that are not analysed: boxes of more than 60 points along an axis, isovalues that are not
-    /// finite and, at the border of a bounded grid, isovalues that are extreme or beyond the weights' range.
+    /// `None` for cases that are not analysed: boxes of more than 60 points along an axis (two fewer for each step of
+    /// smoothing), isovalues that are not finite and, at the border of a bounded grid, isovalues that are extreme or
+    /// beyond the weights' range.
     #[doc(hidden)]
     pub fn chunks_with_mesh_changes(
         &self,
         before: &BTreeMap<[i32; 3], GridChunk<W>>,
         changed: Region,
-        settings: &MeshSettings,
+        method: impl Into<MeshMethod>,
     ) -> Option<BTreeSet<[i32; 3]>> {
         if changed.is_empty() {
             return Some(BTreeSet::new());
         }
-        let read = changed.grown(REACH, REACH);
-        let fits = (0..3).all(|axis| changed.size()[axis] + 2 * REACH == read.size()[axis] && read.size()[axis] <= 64);
-        let (threshold, border) =
-            (W::threshold(settings.isovalue), self.border().filter(|border| border.reaches(&read)));
-        let is_extreme = W::OUTSIDE.inside(threshold) || settings.isovalue.abs() > MAX_BORDER_ISOVALUE;
+        let method = method.into();
+        let (isovalue, reach) = (method.isovalue(), Reach::new(&method));
+        // The samples through which changes show, and their neighbours.
+        let read = changed.grown(reach.steps + 1, reach.steps + 1);
+        let is_whole = |axis: usize| read.size()[axis] - changed.size()[axis] == 2 * (reach.steps + 1);
+        let fits = (0..3).all(|axis| read.size()[axis] <= 64 && is_whole(axis));
+        let (threshold, border) = (W::threshold(isovalue), self.border().filter(|border| border.reaches(&read)));
+        let is_extreme = W::OUTSIDE.inside(threshold) || isovalue.abs() > MAX_BORDER_ISOVALUE;
         if !fits || border.is_some() && is_extreme {
             return None;
         }
         let shape = Shape::new(read.size()).ok()?;
         let weights = self.weights(read, shape, border);
-        let signs = BitGrid::from_samples(Samples::new(shape, &weights).ok()?, settings.isovalue).ok()?;
+        let signs = BitGrid::from_samples(Samples::new(shape, &weights).ok()?, isovalue).ok()?;
         let now = signs.words();
         let mut rows = Rows { read, now, before: now.to_vec(), changed: vec![0; now.len()] };
         let air = GridChunk::AIR;
@@ -61,9 +66,10 @@ impl<W: Weight> Grid<W> {
             let new = self.chunk(*position).unwrap_or(&air);
             rows.compare(old, new, self.chunk_region(*position), changed, threshold, border);
         }
-        let shows = rows.shows(changed, settings.topology);
+        let shows = rows.shows(changed, reach);
         let has_changed = |position: &[i32; 3]| {
-            let meshed = self.chunk_region(*position).grown(0, 1).intersection(&changed.grown(1, 1));
+            let cells = self.chunk_region(*position).grown(reach.below, 1);
+            let meshed = cells.intersection(&changed.grown(reach.steps, reach.steps));
             rows.rows_of(meshed).any(|(row, _, mask)| shows[row] & mask != 0)
         };
         Some(self.chunks_affected_by(changed).points().filter(has_changed).collect())
@@ -100,6 +106,33 @@ impl<W: Weight> Grid<W> {
             }
         }
         weights
+    }
+}
+
+/// How far a changed sample shows.
+#[derive(Clone, Copy)]
+struct Reach {
+    /// The most steps along each axis from a changed sample to one through which it shows.
+    steps: u32,
+    /// The cells below a chunk's own that its mesh has vertices in.
+    below: u32,
+    /// Whether it shows along the axes alone; otherwise through the whole cube around it.
+    is_axial: bool,
+    /// Whether it shows through corners of cells that the surface crosses; otherwise through ends of crossed edges.
+    is_by_cells: bool,
+}
+
+impl Reach {
+    const fn new(method: &MeshMethod) -> Self {
+        match method {
+            MeshMethod::Primal(settings) => {
+                let is_by_cells = matches!(settings.topology, Topology::Trilinear);
+                Self { steps: 1, below: 0, is_axial: true, is_by_cells }
+            }
+            MeshMethod::Dual(_) => {
+                Self { steps: method.margins()[0] - 1, below: 1, is_axial: false, is_by_cells: true }
+            }
+        }
     }
 }
 
@@ -158,17 +191,18 @@ impl Rows<'_> {
     }
 
     /// The samples through which the change shows: the ends of edges whose vertices depend on changed samples, and the
-    /// corners of cells whose triangles do. One word a row. `changed`: the box around the changed samples, [`REACH`]
-    /// inside of the box that was read.
-    fn shows(&self, changed: Region, topology: Topology) -> Vec<u64> {
+    /// corners of cells whose triangles do. One word a row. `changed`: the box around the changed samples, one step more
+    /// than the reach inside of the box that was read.
+    fn shows(&self, changed: Region, reach: Reach) -> Vec<u64> {
         let ny = self.read.size()[1] as usize;
         let mut shows = vec![0; self.now.len()];
-        for (row, ..) in self.rows_of(changed.grown(1, 1)) {
+        let cubes = if reach.is_axial { Vec::new() } else { self.cubes_around_changes(reach.steps as usize) };
+        for (row, ..) in self.rows_of(changed.grown(reach.steps, reach.steps)) {
             let beside = [row - 1, row + 1, row - ny, row + ny];
             let around = |rows: &[u64]| {
                 rows[row] << 1 | rows[row] >> 1 | beside.iter().fold(0, |all, beside| all | rows[*beside])
             };
-            let near = self.changed[row] | around(&self.changed);
+            let near = if reach.is_axial { self.changed[row] | around(&self.changed) } else { cubes[row] };
             if near == 0 {
                 continue;
             }
@@ -179,7 +213,7 @@ impl Rows<'_> {
                 apart | (signs[row] ^ signs[row] << 1) | (signs[row] ^ signs[row] >> 1)
             };
             shows[row] = near & (ends(self.now) | ends(&self.before));
-            if topology == Topology::Trilinear {
+            if reach.is_by_cells {
                 // Samples of which any of the 26 neighbours has the other sign.
                 let mixed = |signs: &[u64]| {
                     let nine = || [row - ny, row, row + ny].into_iter().flat_map(|row| &signs[row - 1..row + 2]);
@@ -190,6 +224,28 @@ impl Rows<'_> {
             }
         }
         shows
+    }
+
+    /// Changed samples and all within some steps of them on every axis.
+    fn cubes_around_changes(&self, steps: usize) -> Vec<u64> {
+        let along_x = |row: &u64| (1..=steps).fold(*row, |all, step| all | *row << step | *row >> step);
+        let mut rows: Vec<u64> = self.changed.iter().map(along_x).collect();
+        // Rows that follow each other along y, then along z. A row of the box's other side stands for one beyond its
+        // end, but nothing changed there.
+        for stride in [1, self.read.size()[1] as usize] {
+            let beside = |row: usize| {
+                (1..=steps).fold(rows[row], |all, step| {
+                    let [before, after] = [row.checked_sub(step * stride), Some(row + step * stride)];
+                    [before, after]
+                        .into_iter()
+                        .flatten()
+                        .filter_map(|row| rows.get(row))
+                        .fold(all, |all, row| all | row)
+                })
+            };
+            rows = (0..rows.len()).map(beside).collect();
+        }
+        rows
     }
 
     /// The rows of a box within the box that was read: each row's number, its y and z, and a mask of its samples that
@@ -231,7 +287,7 @@ mod tests {
 
     use super::*;
     use crate::brush::{Operation, QuantisedShape, QuantisedStamp};
-    use crate::{MeshBuffer, Mesher, Voxel};
+    use crate::{DualSettings, MeshBuffer, MeshSettings, Mesher, Voxel};
 
     const CELLS: u32 = 8;
     const CHUNKS: Region = Region::new([-1; 3], [2; 3]);
@@ -264,9 +320,9 @@ mod tests {
         (shape, operation).prop_map(|(shape, operation)| QuantisedStamp::new(shape, operation, 3))
     }
 
-    fn mesh(grid: &Grid, position: [i32; 3], settings: &MeshSettings) -> MeshBuffer {
+    fn mesh(grid: &Grid, position: [i32; 3], method: impl Into<MeshMethod>) -> MeshBuffer {
         let mut mesh = MeshBuffer::new();
-        grid.mesh_chunk(position, &mut Mesher::new(), settings, &mut mesh).unwrap();
+        grid.mesh_chunk(position, &mut Mesher::new(), method, &mut mesh).unwrap();
         mesh
     }
 
@@ -279,11 +335,15 @@ mod tests {
         fn chunks_without_mesh_changes_have_equal_meshes(
             seed in any::<u32>(),
             [bounded, is_noise, exact] in any::<[bool; 3]>(),
+            smoothing in prop::option::of(0..=6u32),
             isovalue in prop_oneof![Just(0.0f32), -2.0..2.0f32],
             stamps in prop::collection::vec(stamp(), 1..3),
         ) {
             let before = ground(seed, bounded, is_noise);
             let mut after = before.clone();
+            if let Some(smoothing) = smoothing {
+                after.set_mesh_method(DualSettings { smoothing, ..DualSettings::default() }).unwrap();
+            }
             let changed = stamps.iter().fold(Region::new([0; 3], [0; 3]), |all, stamp| all.union(&after.apply(stamp).region));
             let affected = after.chunks_affected_by(changed);
             let mut old = chunks(&before);
@@ -291,11 +351,14 @@ mod tests {
                 old.entry(position).or_insert(GridChunk::AIR);
             }
             let topology = if exact { Topology::Trilinear } else { Topology::Separated };
-            let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
-            let changed_meshes = after.chunks_with_mesh_changes(&old, changed, &settings);
+            let method = match smoothing {
+                None => MeshMethod::Primal(MeshSettings { isovalue, topology, ..MeshSettings::default() }),
+                Some(smoothing) => MeshMethod::Dual(DualSettings { isovalue, smoothing, ..DualSettings::default() }),
+            };
+            let changed_meshes = after.chunks_with_mesh_changes(&old, changed, method);
             prop_assert!(changed_meshes.is_some());
             for position in affected.points() {
-                let is_equal = || mesh(&before, position, &settings) == mesh(&after, position, &settings);
+                let is_equal = || mesh(&before, position, method) == mesh(&after, position, method);
                 let has_changed = changed_meshes.as_ref().is_none_or(|changed_meshes| changed_meshes.contains(&position));
                 prop_assert!(has_changed || is_equal(), "chunk {:?}", position);
             }
@@ -304,35 +367,48 @@ mod tests {
 
     /// Puts one solid sample in the air at each position around the common corner of eight chunks, and changes each
     /// sample near it in turn.
-    #[test]
-    fn no_mesh_change_is_missed() {
-        let (settings, mut shown, mut hidden) = (MeshSettings::default(), 0, 0);
-        for ground in Region::new([-2; 3], [2; 3]).points() {
+    fn changes_one_sample_at_a_time(method: MeshMethod, grounds: impl Iterator<Item = [i32; 3]>) {
+        let (mut shown, mut hidden, reach) = (0, 0, method.margins()[1] + 1);
+        for ground in grounds {
             let mut before = Grid::new(CELLS).unwrap();
+            before.set_mesh_method(method).unwrap();
             for position in CHUNKS.points() {
                 // All samples differ, so that every sample that a normal depends on has an effect.
                 before.fill(position, &|[x, y, z]: [f64; 3]| 3.0 + 0.03 * x + 0.05 * y + 0.07 * z, 1.0).unwrap();
             }
             before.set(ground, Voxel::new(-300, 1)).unwrap();
             let old = chunks(&before);
-            let meshes = Region::new([-1; 3], [1; 3]).points().map(|position| mesh(&before, position, &settings));
+            let meshes = Region::new([-1; 3], [1; 3]).points().map(|position| mesh(&before, position, method));
             let meshes: Vec<_> = meshes.collect();
-            for point in Region::new(ground, ground).grown(3, 4).points() {
+            for point in Region::new(ground, ground).grown(reach, reach + 1).points() {
                 let mut after = before.clone();
                 after.set(point, Voxel::new(before.get(point).weight - 9, 2)).unwrap();
                 let changed = Region::new(point, point).grown(0, 1);
-                let changed_meshes = after.chunks_with_mesh_changes(&old, changed, &settings).unwrap();
+                let changed_meshes = after.chunks_with_mesh_changes(&old, changed, method).unwrap();
                 for (position, mesh_before) in Region::new([-1; 3], [1; 3]).points().zip(&meshes) {
                     let has_changed = changed_meshes.contains(&position);
                     *if has_changed { &mut shown } else { &mut hidden } += 1;
                     assert!(
-                        has_changed || mesh(&after, position, &settings) == *mesh_before,
+                        has_changed || mesh(&after, position, method) == *mesh_before,
                         "{ground:?}, {point:?}, chunk {position:?}"
                     );
                 }
             }
         }
         assert!(shown > 1000 && hidden > 1000, "{shown}, {hidden}");
+    }
+
+    #[test]
+    fn no_mesh_change_is_missed() {
+        changes_one_sample_at_a_time(MeshMethod::default(), Region::new([-2; 3], [2; 3]).points());
+    }
+
+    #[test]
+    fn no_change_of_a_dual_mesh_is_missed() {
+        for (smoothing, step) in [(0, 3), (2, 15)] {
+            let method = MeshMethod::Dual(DualSettings { smoothing, ..DualSettings::default() });
+            changes_one_sample_at_a_time(method, Region::new([-2; 3], [2; 3]).points().step_by(step));
+        }
     }
 
     /// Digs a ball into flat ground. Its effect on deep chunks does not show.

@@ -11,6 +11,7 @@ use alloc::vec::Vec;
 use proptest::prelude::*;
 
 use super::*;
+use crate::mesher::{DualSettings, MeshSettings};
 
 fn voxel() -> impl Strategy<Value = Voxel> {
     (any::<i16>(), any::<u8>()).prop_map(|(weight, material)| Voxel { weight, material })
@@ -68,10 +69,27 @@ fn around(position: [i32; 3]) -> Region {
     Region::new(position, position).grown(1, 2)
 }
 
-/// The lattice points that the mesh of the chunk at `position` reads.
+/// The lattice points that the primal mesh of the chunk at `position` reads.
 fn block_region(position: [i32; 3], cells: u32) -> Region {
     let n = cells as i32;
     Region::new(position.map(|c| n * c - 1), position.map(|c| n * c + n + 2))
+}
+
+/// The lattice points that the mesh of the chunk at `position` reads.
+fn read_region(position: [i32; 3], cells: u32, smoothing: Option<u32>) -> Region {
+    match smoothing {
+        None => block_region(position, cells),
+        Some(smoothing) => {
+            let n = cells as i32;
+            Region::new(position.map(|c| n * c), position.map(|c| n * c + n)).grown(2 + smoothing, 2 + smoothing)
+        }
+    }
+}
+
+fn method(smoothing: Option<u32>) -> MeshMethod {
+    smoothing.map_or_else(MeshMethod::default, |smoothing| {
+        MeshMethod::Dual(DualSettings { smoothing, ..DualSettings::default() })
+    })
 }
 
 proptest! {
@@ -100,13 +118,20 @@ proptest! {
     #[test]
     fn blocks_hold_samples_as_meshed(
         (grid, centre) in grid(), step in [-1..=1i32, -1..=1, -1..=1], isovalue in prop_oneof![Just(0.0), -3.0..3.0f32],
+        smoothing in proptest::option::of(0..=6u32),
     ) {
         let mut block = Block::new();
         // An off-centre chunk has absent neighbours, and often lies beyond the bounds itself.
         for position in [centre, core::array::from_fn(|axis| centre[axis] + step[axis])] {
-            grid.neighbourhood(position).block(isovalue, &mut block);
+            match smoothing {
+                None => grid.neighbourhood(position).block(isovalue, &mut block),
+                Some(smoothing) => {
+                    let settings = DualSettings { isovalue, smoothing, ..DualSettings::default() };
+                    grid.neighbourhood(position).dual_block(&settings, &mut block).unwrap();
+                }
+            }
             let samples = block.samples();
-            let region = block_region(position, grid.chunk_cells());
+            let region = read_region(position, grid.chunk_cells(), smoothing);
             prop_assert_eq!(samples.shape().size(), region.size());
             prop_assert!(samples.is_padded());
             for (index, point) in region.points().enumerate() {
@@ -165,6 +190,7 @@ proptest! {
     #[test]
     fn changed_bounds_give_the_meshes_of_a_fresh_grid(
         (grid, centre) in grid(), margins in proptest::option::of(([0..3i32, 0..3, 0..3], [1..3i32, 1..3, 1..3])),
+        smoothing in proptest::option::of(0..=6u32),
     ) {
         let bounds = margins.map(|(low, high)| {
             Region::new([0, 1, 2].map(|i| centre[i] - low[i]), [0, 1, 2].map(|i| centre[i] + high[i]))
@@ -175,14 +201,16 @@ proptest! {
         for (position, chunk) in grid.chunks().filter(|(position, _)| bounds.is_none_or(|b| b.contains(*position))) {
             fresh.insert(position, chunk.clone()).unwrap();
         }
+        // Much smoothing of small chunks lets the border show in the second layer of chunks.
+        let layers = if smoothing.is_some_and(|smoothing| smoothing + 7 > grid.chunk_cells()) { 2 } else { 1 };
         let is_inner = |position: [i32; 3], bounds: Option<Region>| {
-            bounds.is_none_or(|Region { min, max }| (0..3).all(|i| min[i] < position[i] && position[i] < max[i] - 1))
+            let is_inner = |v: i32, min: i32, max: i32| min + layers <= v && v < max - layers;
+            bounds.is_none_or(|Region { min, max }| (0..3).all(|i| is_inner(position[i], min[i], max[i])))
         };
         let (mut mesher, mut meshes) = (Mesher::new(), [const { MeshBuffer::new() }; 3]);
         for position in around(centre).grown(1, 1).points() {
-            let settings = MeshSettings::default();
             for (grid, mesh) in [&grid, &moved, &fresh].into_iter().zip(&mut meshes) {
-                grid.mesh_chunk(position, &mut mesher, &settings, mesh).unwrap();
+                grid.mesh_chunk(position, &mut mesher, method(smoothing), mesh).unwrap();
             }
             prop_assert_eq!(&meshes[1], &meshes[2], "{:?}", position);
             let stays = is_inner(position, grid.bounds()) && is_inner(position, bounds);
@@ -198,20 +226,22 @@ proptest! {
         min in [-200..200i32, -200..200, -200..200],
         size in [0..70i32, 0..70, 0..3],
         bounds in proptest::option::of(([-4..4i32, -4..4, -4..4], [1..9i32, 1..9, 1..9])),
+        smoothing in proptest::option::of(0..=6u32),
     ) {
         let changed = Region::new(min, core::array::from_fn(|axis| min[axis] + size[axis]));
-        let grid = match bounds {
+        let mut grid = match bounds {
             None => Grid::<i16>::new(cells),
             Some((low, size)) => {
                 Grid::bounded(cells, Region::new(low, core::array::from_fn(|axis| low[axis] + size[axis])))
             }
         }
         .unwrap();
+        grid.set_mesh_method(method(smoothing)).unwrap();
         let affected = grid.chunks_affected_by(changed);
         let within = grid.bounds().unwrap_or(Region::new([i32::MIN; 3], [i32::MAX; 3]));
         let mut found = 0;
         for position in Region::new(grid.chunk_of(min), grid.chunk_of(changed.max)).grown(2, 3).points() {
-            let reads = !changed.is_empty() && !block_region(position, cells).intersection(&changed).is_empty();
+            let reads = !changed.is_empty() && !read_region(position, cells, smoothing).intersection(&changed).is_empty();
             prop_assert_eq!(affected.contains(position), reads && within.contains(position), "{:?}", position);
             found += u32::from(affected.contains(position));
         }
@@ -219,8 +249,11 @@ proptest! {
     }
 
     #[test]
-    fn setting_marks_the_chunks_that_read_the_point((grid, centre) in grid(), offset in [0..13i32, 0..13, 0..13]) {
+    fn setting_marks_the_chunks_that_read_the_point(
+        (grid, centre) in grid(), offset in [0..13i32, 0..13, 0..13], smoothing in proptest::option::of(0..=6u32),
+    ) {
         let mut grid = grid;
+        grid.set_mesh_method(method(smoothing)).unwrap();
         let cells = grid.chunk_cells() as i32;
         let point = core::array::from_fn(|axis| centre[axis] * cells + offset[axis] % cells);
         grid.take_dirty();
@@ -230,7 +263,7 @@ proptest! {
         grid.set(point, Voxel::new(old.weight, old.material ^ 1)).unwrap();
         let expected: BTreeSet<_> = around(centre)
             .points()
-            .filter(|&position| block_region(position, cells as u32).contains(point))
+            .filter(|&position| read_region(position, cells as u32, smoothing).contains(point))
             .filter(|&position| grid.bounds().is_none_or(|bounds| bounds.contains(position)))
             .collect();
         prop_assert_eq!(grid.take_dirty(), expected);

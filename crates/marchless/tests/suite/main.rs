@@ -13,6 +13,7 @@ mod cases;
 mod chunks;
 mod crossings;
 mod dual;
+mod dual_grid;
 mod exhaustive;
 mod extraction;
 mod levels;

@@ -4,7 +4,8 @@ use core::fmt::Debug;
 use std::collections::{BTreeMap, HashMap};
 
 use marchless::{
-    Block, Grid, GridChunk, GridSamples, MeshBuffer, MeshReport, MeshSettings, Mesher, Region, Topology, Voxel, Weight,
+    Block, Grid, GridChunk, GridSamples, MeshBuffer, MeshMethod, MeshReport, MeshSettings, Mesher, Region, Topology,
+    Voxel, Weight,
 };
 use proptest::prelude::*;
 
@@ -12,7 +13,7 @@ use crate::support::random;
 
 /// How the samples of a random grid are made.
 #[derive(Clone, Copy, Debug)]
-enum Field {
+pub(crate) enum Field {
     /// Any bit pattern at every point.
     Noise,
     /// Few values near the isovalue, ties included.
@@ -24,7 +25,7 @@ enum Field {
 }
 
 /// Weights that random bits make.
-trait AnyWeight: Weight + Debug {
+pub(crate) trait AnyWeight: Weight + Debug {
     fn any(bits: u64) -> Self;
 }
 
@@ -66,7 +67,7 @@ fn chunk<W: AnyWeight>(field: Field, seed: u64, region: Region) -> GridChunk<W> 
     GridChunk::Samples(GridSamples { weights, materials }.into())
 }
 
-fn grid<W: AnyWeight>(field: Field, seed: u64, cells: u32, bounds: Region) -> Grid<W> {
+pub(crate) fn grid<W: AnyWeight>(field: Field, seed: u64, cells: u32, bounds: Region) -> Grid<W> {
     let mut grid = Grid::bounded(cells, bounds).expect("a sound size");
     for position in bounds.points() {
         // Some chunks are absent, and some whole ones stand between sampled ones.
@@ -79,18 +80,19 @@ fn grid<W: AnyWeight>(field: Field, seed: u64, cells: u32, bounds: Region) -> Gr
 }
 
 /// An exact place in lattice space: `f64` holds the sum of a chunk's origin and an `f32` position within the chunk.
-type Key = [u64; 3];
+pub(crate) type Key = [u64; 3];
 
-fn key(origin: [i32; 3], position: [f32; 3]) -> Key {
+pub(crate) fn key(origin: [i32; 3], position: [f32; 3]) -> Key {
     // Adding 0.0 turns −0.0, which is the same place as 0.0, into it.
     core::array::from_fn(|axis| (f64::from(origin[axis]) + f64::from(position[axis]) + 0.0).to_bits())
 }
 
-fn meshes<W: AnyWeight>(grid: &Grid<W>, settings: &MeshSettings) -> BTreeMap<[i32; 3], MeshBuffer> {
+pub(crate) fn meshes<W: AnyWeight>(grid: &Grid<W>, method: impl Into<MeshMethod>) -> BTreeMap<[i32; 3], MeshBuffer> {
+    let method = method.into();
     let (mut mesher, mut block) = (Mesher::new(), Block::new());
     let mesh = |position| {
         let mut mesh = MeshBuffer::new();
-        grid.neighbourhood(position).mesh(&mut mesher, &mut block, settings, &mut mesh).expect("sound settings");
+        grid.neighbourhood(position).mesh(&mut mesher, &mut block, method, &mut mesh).expect("sound settings");
         (position, mesh)
     };
     grid.bounds().expect("a bounded grid").points().map(mesh).collect()
