@@ -4,6 +4,7 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
+use marchless::DualSettings;
 
 use crate::error::Error;
 use crate::output::FORMATS;
@@ -66,6 +67,18 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(crate) exact: bool,
 
+    /// Mesh with the dual mesher: one vertex in each cell that the surface crosses, or several where it passes more than
+    /// once.
+    ///
+    /// Without --close, the surface ends up to one cell before the border of the volume. The whole volume is held in
+    /// memory.
+    #[arg(long, conflicts_with_all = ["exact", "chunk"])]
+    pub(crate) dual: bool,
+
+    /// Smooth the dual mesh in N steps, 0 to 8; vertices stay in their cells.
+    #[arg(long, value_name = "N", requires = "dual", value_parser = steps, default_value_t = 0, allow_hyphen_values = true)]
+    pub(crate) smooth: u32,
+
     /// Write one mesh per chunk of N cells along each axis (fewer at the far ends), not a single one.
     ///
     /// The files are OUT.0000.ply and so on, numbered by chunk, x fastest. Together they are the whole mesh, in its
@@ -76,7 +89,8 @@ pub(crate) struct Args {
 
     /// Print a report of the mesh's soundness; with any defect, write nothing and end with exit code 3.
     ///
-    /// The surface may be open where it leaves the volume, unless --close closes it. Each chunk is checked by itself.
+    /// The surface may be open where it leaves the volume, unless --close closes it; with --dual, which ends before the
+    /// border, --close is needed. Each chunk is checked by itself.
     /// The mesh is held in memory: a layer of chunks at a time with --chunk, otherwise all of it. The check takes
     /// another 200 bytes per triangle.
     #[arg(long)]
@@ -93,12 +107,20 @@ impl Args {
         self.close as u32
     }
 
-    /// Checks the names and places of the files before any work is done.
+    /// The settings of the dual mesher, at an isovalue of the weights; `None` for the primal one.
+    pub(crate) fn dual_settings(&self, isovalue: f32) -> Option<DualSettings> {
+        self.dual.then(|| DualSettings { isovalue, smoothing: self.smooth, ..DualSettings::default() })
+    }
+
+    /// Checks the names and places of the files, and which options go together, before any work is done.
     ///
     /// # Errors
     /// [`Error`] if the output would replace the input (the files of chunks are checked later), if its folder does not
-    /// exist, or if it is not a file or has no known format.
-    pub(crate) fn check_files(&self) -> Result<(), Error> {
+    /// exist, or if it is not a file or has no known format; [`Error::OpenCheck`].
+    pub(crate) fn check_usage(&self) -> Result<(), Error> {
+        if self.dual && self.check && !self.close {
+            return Err(Error::OpenCheck);
+        }
         let path = || self.output.clone();
         if self.chunk.is_none() {
             self.check_replaced(&self.output)?;
@@ -151,6 +173,11 @@ fn bytes(text: &str) -> Result<u64, String> {
 
 fn cells(text: &str) -> Result<NonZeroU32, String> {
     text.trim().parse().map_err(|_| format!("it must be a whole number of cells from 1 to {}", u32::MAX))
+}
+
+fn steps(text: &str) -> Result<u32, String> {
+    let number = text.trim().parse().ok().filter(|number| *number <= 8);
+    number.ok_or_else(|| "it must be a whole number of steps from 0 to 8".to_owned())
 }
 
 fn shape(text: &str) -> Result<[u32; 3], String> {

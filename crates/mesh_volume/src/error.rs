@@ -86,6 +86,12 @@ pub(crate) enum Error {
     )]
     TooManyChunks { cells: u32, chunks: u128, most: u64, least: u64 },
 
+    #[error("the volume does not fit in memory, which --dual needs to hold it")]
+    VolumeMemory,
+
+    #[error("with --dual, --check needs --close: otherwise the surface ends before the border, and is open there")]
+    OpenCheck,
+
     #[error("the mesh does not fit in memory, which --chunk and --check need to hold it")]
     MeshMemory,
 
@@ -138,7 +144,7 @@ impl Error {
         match self {
             Self::Interrupted => 130,
             Self::NotClean => 3,
-            Self::Memory { .. } | Self::MeshMemory | Self::Write { .. } | Self::Remove { .. } => 1,
+            Self::Memory { .. } | Self::VolumeMemory | Self::MeshMemory | Self::Write { .. } | Self::Remove { .. } => 1,
             _ => 2,
         }
     }

@@ -5,6 +5,7 @@
 //! mesh_volume engine.raw --shape 256,256,128 --type u8 --iso 80 --spacing 1,1,1.6 -o engine.glb
 //! mesh_volume caves.npy --chunk 64 --check -o caves.ply
 //! mesh_volume mask.npy --iso 0.5 --invert --close -o part.stl
+//! mesh_volume mask.npy --iso 0.5 --invert --close --dual --smooth 4 -o smooth.stl
 //! mesh_volume scan.raw --shape 512,512,300 --type i16 --endian big --skip 1024 --origin -20,0,35.5 -o scan.ply
 //! ```
 //!
@@ -16,7 +17,11 @@
 //! The surface is open where it leaves the volume; `--close` closes it, half a sample beyond the outermost samples.
 //! `--origin` is the position of the first sample. Positions are `f32`: far from 0, they are rounded.
 //!
-//! The volume may be larger than memory: it is read, meshed and written a slab (the samples of one z) at a time. With
+//! With `--dual`, vertices lie in cells instead of on edges. `--smooth` moves each towards the mean of its neighbours,
+//! within its cell: it takes away the steps of a mask.
+//!
+//! The volume may be larger than memory: it is read, meshed and written a slab (the samples of one z) at a time. Only
+//! `--dual` holds all of it. With
 //! `--chunk`, the meshes of one layer of chunks are held until the layer is complete. With `--check` alone, the whole
 //! mesh is held, but never the volume. So the check judges the mesh by itself, as any reader would find it, not against
 //! its samples.
@@ -62,7 +67,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Error> {
-    args.check_files()?;
+    args.check_usage()?;
     let mut volume = Volume::open(args)?;
     let transform = Transform::new(args, &volume)?;
     let chunks = args.chunk.map(|size| Chunks::new(size, args.margin(), &volume)).transpose()?;

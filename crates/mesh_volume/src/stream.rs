@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use marchless::{MeshBuffer, MeshError, MeshSettings, SlabMesher, Topology, Weight};
+use marchless::{
+    DualSettings, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, SlabMesher, Topology, Weight,
+};
 
 use crate::Stop;
 use crate::args::Args;
@@ -93,12 +95,20 @@ fn for_each_slab<S: Sample>(
     Ok(())
 }
 
+/// Either mesher.
+enum VolumeMesher<W> {
+    /// The primal mesher, slab by slab.
+    Primal(SlabMesher<W>),
+    /// The dual mesher, with the samples of all slabs so far: `slab` samples along x and y.
+    Dual { settings: DualSettings, slab: [u32; 2], weights: Vec<W> },
+}
+
 /// A mesher with its progress from the first slab to the last.
 struct Meshing<'a, W> {
     args: &'a Args,
     stop: &'a Stop,
     sink: Box<dyn Sink>,
-    mesher: SlabMesher<W>,
+    mesher: VolumeMesher<W>,
     mesh: MeshBuffer,
     /// The number of the next slab.
     next: u32,
@@ -116,9 +126,20 @@ impl<'a, W: Weight> Meshing<'a, W> {
         sink: Box<dyn Sink>,
         stop: &'a Stop,
     ) -> Result<Self, Error> {
-        let topology = if args.exact { Topology::Trilinear } else { Topology::Separated };
-        let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
-        let mesher = SlabMesher::new(slab, settings).map_err(|source| error(args, source))?;
+        let mesher = match args.dual_settings(isovalue) {
+            Some(settings) => {
+                let samples = slab.iter().try_fold(slabs as usize, |all, samples| all.checked_mul(*samples as usize));
+                let mut weights = Vec::new();
+                let reserved = samples.map(|samples| weights.try_reserve_exact(samples));
+                reserved.and_then(Result::ok).ok_or(Error::VolumeMemory)?;
+                VolumeMesher::Dual { settings, slab, weights }
+            }
+            None => {
+                let topology = if args.exact { Topology::Trilinear } else { Topology::Separated };
+                let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
+                VolumeMesher::Primal(SlabMesher::new(slab, settings).map_err(|source| error(args, source))?)
+            }
+        };
         let (mesh, progress) = (MeshBuffer::new(), progress_bar(slabs));
         let (times, since) = (Times::default(), Instant::now());
         Ok(Self { args, stop, sink, mesher, mesh, next: 0, times, since, progress })
@@ -127,11 +148,19 @@ impl<'a, W: Weight> Meshing<'a, W> {
     /// Meshes one more slab.
     fn push(&mut self, weights: &[W]) -> Result<(), Error> {
         spend(&mut self.since, &mut self.times.reading);
-        self.mesher.push(weights, &mut self.mesh).map_err(|source| error(self.args, source))?;
-        spend(&mut self.since, &mut self.times.meshing);
-        // The mesher's output for a slab comes when the next slab is pushed.
-        if let Some(made) = self.next.checked_sub(1) {
-            self.sink.take(made, &mut self.mesh, self.stop)?;
+        match &mut self.mesher {
+            VolumeMesher::Dual { weights: all, .. } => {
+                all.extend_from_slice(weights);
+                self.stop.check()?;
+            }
+            VolumeMesher::Primal(mesher) => {
+                mesher.push(weights, &mut self.mesh).map_err(|source| error(self.args, source))?;
+                spend(&mut self.since, &mut self.times.meshing);
+                // The mesher's output for a slab comes when the next slab is pushed.
+                if let Some(made) = self.next.checked_sub(1) {
+                    self.sink.take(made, &mut self.mesh, self.stop)?;
+                }
+            }
         }
         self.next += 1;
         spend(&mut self.since, &mut self.times.writing);
@@ -141,7 +170,15 @@ impl<'a, W: Weight> Meshing<'a, W> {
 
     /// Completes the mesh.
     fn finish(mut self) -> Result<(Made, Times), Error> {
-        self.mesher.finish(&mut self.mesh).map_err(|source| error(self.args, source))?;
+        let finished = match self.mesher {
+            VolumeMesher::Primal(mesher) => mesher.finish(&mut self.mesh),
+            VolumeMesher::Dual { settings, slab: [x, y], weights } => {
+                let shape = Shape::new([x, y, self.next]).map_err(|_| Error::VolumeMemory)?;
+                let samples = Samples::new(shape, &weights).map_err(|_| Error::VolumeMemory)?;
+                Mesher::new().mesh_dual(samples, &settings, &mut self.mesh)
+            }
+        };
+        finished.map_err(|source| error(self.args, source))?;
         spend(&mut self.since, &mut self.times.meshing);
         self.sink.take(self.next - 1, &mut self.mesh, self.stop)?;
         let made = self.sink.finish(self.stop)?;

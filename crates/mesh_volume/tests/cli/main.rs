@@ -4,6 +4,7 @@
 mod check;
 mod chunks;
 mod close;
+mod dual;
 mod exact;
 mod layouts;
 mod origin;
@@ -15,28 +16,42 @@ mod volumes;
 
 use std::collections::BTreeSet;
 
-use marchless::{MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
+use marchless::{DualSettings, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Weight};
 use program::Folder;
 use readers::Mesh;
 use volumes::{TYPES, Volume, random};
 
 /// The mesh of the whole volume at once, for numbers that fit the core's weights.
 fn whole(volume: &Volume, iso: f64) -> Mesh {
-    fn mesh<W: Weight>(volume: &Volume, isovalue: f64, weight: impl Fn(f64) -> W) -> Mesh {
+    whole_by(volume, iso, None)
+}
+
+/// The mesh of the whole volume at once; with steps of smoothing, by the dual mesher.
+fn whole_by(volume: &Volume, iso: f64, dual: Option<u32>) -> Mesh {
+    fn mesh<W: Weight>(volume: &Volume, isovalue: f64, dual: Option<u32>, weight: impl Fn(f64) -> W) -> Mesh {
         let shape = Shape::new(volume.size.map(|n| n as u32)).expect("a small shape");
         let weights: Vec<W> = volume.samples.iter().map(|&sample| weight(sample)).collect();
-        let settings = MeshSettings { isovalue: isovalue as f32 / W::SCALE, ..MeshSettings::default() };
-        let mut out = MeshBuffer::new();
+        let (isovalue, mut out) = (isovalue as f32 / W::SCALE, MeshBuffer::new());
         let samples = Samples::new(shape, &weights).expect("one weight a sample");
-        Mesher::new().mesh(samples, &settings, &mut out).expect("it can be meshed");
+        let meshed = match dual {
+            None => {
+                let settings = MeshSettings { isovalue, ..MeshSettings::default() };
+                Mesher::new().mesh(samples, &settings, &mut out)
+            }
+            Some(smoothing) => {
+                let settings = DualSettings { isovalue, smoothing, ..DualSettings::default() };
+                Mesher::new().mesh_dual(samples, &settings, &mut out)
+            }
+        };
+        meshed.expect("it can be meshed");
         Mesh { positions: out.positions, normals: out.normals, indices: out.indices }
     }
     match volume.kind {
-        "i8" => mesh(volume, iso, |sample| sample as i8),
-        "u8" => mesh(volume, iso - 128.0, |sample| (sample - 128.0) as i8),
-        "i16" => mesh(volume, iso, |sample| sample as i16),
-        "u16" => mesh(volume, iso - 32768.0, |sample| (sample - 32768.0) as i16),
-        _ => mesh(volume, 0.0, |sample| (sample - iso) as f32),
+        "i8" => mesh(volume, iso, dual, |sample| sample as i8),
+        "u8" => mesh(volume, iso - 128.0, dual, |sample| (sample - 128.0) as i8),
+        "i16" => mesh(volume, iso, dual, |sample| sample as i16),
+        "u16" => mesh(volume, iso - 32768.0, dual, |sample| (sample - 32768.0) as i16),
+        _ => mesh(volume, 0.0, dual, |sample| (sample - iso) as f32),
     }
 }
 
