@@ -88,6 +88,8 @@ impl ChunkKey {
 
 /// The mesh of a chunk as shown now, in voxels of its level from the chunk's lowest corner. It exists without a renderer.
 ///
+/// It lies within the chunk, or with the dual mesher up to one voxel below it on each axis.
+///
 /// Empty if nothing is left to draw, because everything was dug away. Where `Assets<Mesh>` exists, the entity's
 /// `Mesh3d` holds the same mesh.
 #[derive(Component, Reflect, Clone, Debug, Default)]

@@ -47,7 +47,7 @@
 //! # The format
 //! The names are those of the settings' fields and variants, so the settings' documentation is also the format's.
 //! Fields that are left out have their defaults; unknown fields are an error. `Some` may be left out, and so may the
-//! inner parentheses of a variant with settings: `NoiseHeights(amplitude: 80.0)`. An [`Extent`](crate::terrain::Extent)
+//! inner parentheses of a variant with settings: `NoiseHeights(amplitude: 80.0)`, `mesher: Dual(smoothing: 2)`. An [`Extent`](crate::terrain::Extent)
 //! gives the first chunk and one past the last for each axis along which it ends: `(y: (-2, 6))`. Numbers may be `inf`
 //! and `-inf` where the settings allow it. [`TerrainDescription::to_ron`] writes this format.
 
@@ -72,8 +72,8 @@ use crate::terrain::Terrain;
 
 /// Makes its entity's [`Terrain`] follow a [`TerrainDescription`], an asset.
 ///
-/// The description sets the terrain's source, palette, voxel size, extent and [`Keep`](crate::terrain::Keep). All other
-/// settings (chunk size, isovalue, normals) stay the terrain's own.
+/// The description sets the terrain's source, palette, voxel size, extent, [`Keep`](crate::terrain::Keep), levels and
+/// mesher. All other settings (chunk size, isovalue, normals) stay the terrain's own.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Debug, PartialEq, Clone)]
 #[require(Terrain, follow::FollowedFile)]

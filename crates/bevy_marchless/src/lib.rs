@@ -31,7 +31,7 @@
 //! The samples live in one place, the [`TerrainVolume`](terrain::TerrainVolume). [`Stamp`](brush::Stamp) messages
 //! change them. [`Chunk`](chunk::Chunk) entities are children of the terrain and mirror what is drawn. All chunks that
 //! an edit changes are meshed from one snapshot and shown in one update. A small edit shows in the update that reads
-//! its stamp. A [`TerrainQuery`](query::TerrainQuery) casts rays.
+//! its stamp. A [`TerrainQuery`](query::TerrainQuery) casts rays. Module [`choosing_a_mesher`] compares the two meshers.
 //!
 //! Everything runs in `PostUpdate` ([`MarchlessSystems`](schedule::MarchlessSystems)), so changes made in `Update` show
 //! in the same frame. Module [`inherit`] gives chunks components of the game's own. Module [`in_your_game`] describes
@@ -62,6 +62,10 @@ pub mod big_space;
 pub mod bits;
 pub mod brush;
 mod budget;
+/// When to choose which mesher, and what changes with it.
+///
+#[doc = include_str!("../docs/meshers.md")]
+pub mod choosing_a_mesher {}
 pub mod chunk;
 mod cover;
 pub mod diagnostics;
@@ -109,7 +113,7 @@ pub mod prelude {
     pub use crate::query::{TerrainHit, TerrainQuery};
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
     pub use crate::stream::TerrainViewer;
-    pub use crate::terrain::{Extent, Keep, Palette, Terrain, TerrainLevels, TerrainVolume};
+    pub use crate::terrain::{DualMesher, Extent, Keep, Palette, Terrain, TerrainLevels, TerrainMesher, TerrainVolume};
 }
 
 plugin_group! {

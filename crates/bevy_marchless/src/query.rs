@@ -2,7 +2,9 @@
 
 mod bounds;
 mod coarser;
+mod dual;
 mod transforms;
+mod triangles;
 mod visibility;
 
 use bevy_app::{App, Plugin, PostUpdate};
@@ -11,11 +13,12 @@ use bevy_ecs::system::SystemParam;
 use bevy_math::{DVec3, IVec3, Ray3d, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::TransformSystems;
-use marchless::Region;
+use marchless::{MeshMethod, Region};
 
 use crate::chunk::ChunkKey;
 use crate::placement::{Placement, PlacementItem};
 use crate::terrain::{TerrainVolume, give_to_terrains};
+use triangles::{MeshHit, MeshRay};
 use visibility::IsHidden;
 
 /// Supports [`TerrainQuery`]: registers its types, records which terrains are hidden, and updates terrains'
@@ -130,6 +133,8 @@ impl TerrainQuery<'_, '_> {
     /// The signed distance from a position in world space to the surface, negative inside, with all edits; interpolated
     /// between samples. [Units: voxels]
     ///
+    /// This is the surface of the samples, whichever mesher draws it. Meshes come close to it; smoothed ones less so.
+    ///
     /// `None` if there is no such terrain, or if a chunk that holds the samples around the position is not filled yet.
     /// Outside the terrain's extent is air.
     pub fn weight_at(&self, terrain: Entity, position: Vec3) -> Option<f32> {
@@ -228,6 +233,15 @@ struct LatticeHit {
     material: u8,
 }
 
+impl LatticeHit {
+    /// A hit of a mesh whose cells are `size` voxels wide. `ray`: in the lattice.
+    fn of_mesh(ray: &MeshRay, hit: MeshHit, size: f64, level: u8, chunk: Entity) -> Self {
+        let MeshHit { distance, normal, material } = hit;
+        let distance = distance * size;
+        Self { chunk, level, distance, lattice: ray.origin + ray.direction * distance, normal, material }
+    }
+}
+
 /// The first drawn triangle of one terrain that a ray hits.
 fn cast(
     (terrain, volume, place): (Entity, &TerrainVolume, PlacementItem),
@@ -242,9 +256,12 @@ fn cast(
     let scale = step.length();
     let direction = step / scale;
     let reach = f64::from(max_distance) * scale;
-    let finest = cast_finest(volume, origin, direction, reach);
+    let finest = match volume.heart().mesh_method() {
+        MeshMethod::Primal(_) => cast_finest(volume, origin, direction, reach),
+        MeshMethod::Dual(_) => dual::cast(volume, MeshRay { origin, direction, reach }),
+    };
     let nearer = finest.as_ref().map_or(reach, |hit| hit.distance);
-    let hit = coarser::cast(volume.heart(), origin, direction, nearer).or(finest)?;
+    let hit = coarser::cast(volume.heart(), MeshRay { origin, direction, reach: nearer }).or(finest)?;
     let normal = to_terrain.matrix3.transpose() * hit.normal;
     Some(TerrainHit {
         terrain,
@@ -258,7 +275,7 @@ fn cast(
     })
 }
 
-/// The first drawn triangle of the finest level.
+/// The first drawn triangle of the finest level, with the primal mesher.
 fn cast_finest(volume: &TerrainVolume, origin: DVec3, direction: DVec3, reach: f64) -> Option<LatticeHit> {
     let (shown, isovalue) = (volume.shown(), volume.shown_isovalue());
     let mut start = 0.0;

@@ -3,6 +3,7 @@
 mod extent;
 mod handle;
 mod levels;
+mod mesher;
 mod prepare;
 mod volume;
 
@@ -13,12 +14,13 @@ use bevy_ecs::prelude::*;
 use bevy_math::{IVec3, UVec3, Vec3};
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{DEFAULT_CHUNK_CELLS, Region, Source};
+use marchless::{DEFAULT_CHUNK_CELLS, MeshMethod, Region, Source};
 use thiserror::Error;
 
 pub use extent::{Extent, Keep};
 pub use handle::{SourceHandle, TerrainSources};
 pub use levels::TerrainLevels;
+pub use mesher::{DualMesher, TerrainMesher};
 pub use volume::TerrainVolume;
 
 use crate::chunk::{Chunk, ChunkGeometry};
@@ -41,8 +43,8 @@ use crate::volume::SamplingSettings;
 /// Other `levels` draw all chunks anew; edits stay. With several levels, another source or extent does so too.
 ///
 /// Changing `extent` or `keep` loads and unloads chunks. Chunks that stay inside the extent keep their state, and edits
-/// come back with their chunks, even where a brush reached across the border. Another `isovalue` shows in one update,
-/// as soon as every chunk is meshed for it. Other `normals` and another `palette` show chunk by chunk.
+/// come back with their chunks, even where a brush reached across the border. Another `isovalue` or `mesher` shows in
+/// one update, as soon as every chunk is meshed for it. Other `normals` and another `palette` show chunk by chunk.
 ///
 /// Settings out of range are refused with an error in the log and a [`TerrainError`] component; the previous settings
 /// stay in effect.
@@ -80,6 +82,8 @@ pub struct Terrain {
     /// voxels of it, so earlier edits are invisible at an isovalue farther away. Sources skip chunks more than 4 voxels
     /// from their surface, so isovalues beyond about ±3 may show seams there.
     pub isovalue: f32,
+    /// How samples become triangles. Default: with the primal mesher. The dual one needs a single level.
+    pub mesher: TerrainMesher,
     /// Whether meshes have normals. Default true.
     pub normals: bool,
     /// The colours of materials.
@@ -101,6 +105,7 @@ impl Terrain {
             chunk_cells: DEFAULT_CHUNK_CELLS,
             voxel_size: 1.0,
             isovalue: 0.0,
+            mesher: TerrainMesher::default(),
             normals: true,
             palette: Palette::default(),
             source: SourceHandle::new(source),
@@ -146,6 +151,12 @@ impl Terrain {
     #[must_use]
     pub fn with_isovalue(self, isovalue: f32) -> Self {
         Self { isovalue, ..self }
+    }
+
+    /// Sets how samples become triangles: a [`TerrainMesher`], or the settings of the dual one.
+    #[must_use]
+    pub fn with_mesher(self, mesher: impl Into<TerrainMesher>) -> Self {
+        Self { mesher: mesher.into(), ..self }
     }
 
     /// Sets whether meshes have normals.
@@ -196,6 +207,10 @@ impl Terrain {
             return Err(TerrainError::Keep { found: u64::try_from(kept).unwrap_or(u64::MAX) });
         }
         self.levels.check()?;
+        self.mesher.check(self.chunk_cells)?;
+        if self.mesher != TerrainMesher::Primal && self.levels.count > 1 {
+            return Err(TerrainError::DualLevels { levels: self.levels.count });
+        }
         if !(self.voxel_size > 0.0 && self.voxel_size.is_finite()) {
             return Err(TerrainError::VoxelSize { found: self.voxel_size });
         }
@@ -233,6 +248,11 @@ impl Terrain {
         }
     }
 
+    /// How meshes are made, apart from their appearance: with normals.
+    pub(crate) fn mesh_method(&self) -> MeshMethod {
+        self.mesher.method(self.isovalue)
+    }
+
     /// Whether both terrains have the same samples before any edit.
     fn has_samples_of(&self, other: &Self) -> bool {
         self.sampling_settings().has_samples_of(&other.sampling_settings())
@@ -240,11 +260,12 @@ impl Terrain {
 
     /// Copies the settings of `other` that do not change the samples.
     fn take_all_but_samples(&mut self, other: &Self) {
-        // Both are in chunks: they were checked with the chunk size of `other`.
+        // They were checked with the chunk size of `other`. Levels and mesher go together.
         if self.chunk_cells == other.chunk_cells {
             (self.extent, self.keep) = (other.extent, other.keep);
+            (self.levels, self.mesher) = (other.levels, other.mesher);
         }
-        (self.isovalue, self.normals, self.levels) = (other.isovalue, other.normals, other.levels);
+        (self.isovalue, self.normals) = (other.isovalue, other.normals);
         self.palette.clone_from(&other.palette);
     }
 }
@@ -314,6 +335,20 @@ pub enum TerrainError {
     Hysteresis {
         /// The rejected share.
         found: f32,
+    },
+    /// There are more steps of smoothing than the dual mesher takes for chunks of this size.
+    #[error("a terrain's dual mesher must have 0 to {most} steps of smoothing, but `mesher` has {found}")]
+    Smoothing {
+        /// The rejected number.
+        found: u32,
+        /// The most steps for the terrain's `chunk_cells`.
+        most: u32,
+    },
+    /// There are several levels of detail with the dual mesher.
+    #[error("a terrain with the dual mesher must have one level of detail, but `levels.count` is {levels}")]
+    DualLevels {
+        /// The number of levels.
+        levels: u8,
     },
     /// The isovalue is NaN or infinite.
     #[error("a terrain's isovalue must be finite, but it is {found}")]
@@ -398,6 +433,7 @@ impl Plugin for TerrainPlugin {
             .register_type::<Chunk>()
             .register_type::<ChunkGeometry>()
             .register_type::<TerrainLevels>()
+            .register_type::<TerrainMesher>()
             .register_type::<Leaf>()
             .register_type::<LeafState>()
             .register_type::<Coverage>()

@@ -5,7 +5,7 @@
 //! each loaded chunk), [`Groups`] (chunks meshed together), [`Cover`] (wanted chunks). Events that involve several
 //! parts are functions here, by topic: [`follow`](mod@follow) (chunks come and go), [`fill`](mod@fill) (samples
 //! arrive), [`edit`](mod@edit) (stamps), [`mesh`](mod@mesh) (groups start and are shown), [`restyle`](mod@restyle)
-//! (colours, normals and isovalue change), [`levels`](mod@levels) (levels of detail change).
+//! (colours, normals, isovalue and mesher change), [`levels`](mod@levels) (levels of detail change).
 
 mod edit;
 mod fill;
@@ -28,7 +28,7 @@ use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
 use bevy_platform::collections::{HashMap, HashSet};
-use marchless::{Edit, Grid, GridChunk, MeshSettings, Region, Source};
+use marchless::{Edit, Grid, GridChunk, MeshMethod, Region, Source};
 
 pub(crate) use edit::Edits;
 pub(crate) use fill::Filled;
@@ -93,14 +93,14 @@ pub(crate) struct Heart {
     sampling: usize,
     /// The source's bounds, by boxes of chunks.
     bounds: HashMap<[i32; 3], Option<GridChunk<i16>>>,
-    /// The isovalue as drawn.
-    isovalue: f32,
+    /// The isovalue and the mesher as drawn. It has normals; those of meshes are the appearance's.
+    method: MeshMethod,
     appearance: Appearance,
     /// Chunks whose appearance may be out of date.
     to_restyle: UniqueQueue,
-    /// The running change of the isovalue, and the isovalue that comes after it.
+    /// The running change of the isovalue or the mesher, and what comes after it.
     transition: Option<Transition>,
-    next_isovalue: Option<f32>,
+    next_method: Option<MeshMethod>,
     /// Whether a stamp waits for samples that had been dropped.
     holds_stamps: bool,
     /// Whether any chunk of the present source has been shown.
@@ -134,11 +134,11 @@ impl Default for Heart {
             remote: HashMap::default(),
             sampling: 0,
             bounds: HashMap::default(),
-            isovalue: 0.0,
+            method: MeshMethod::default(),
             appearance: Appearance::default(),
             to_restyle: UniqueQueue::default(),
             transition: None,
-            next_isovalue: None,
+            next_method: None,
             holds_stamps: false,
             has_shown: false,
             late_edits: Vec::new(),
@@ -152,20 +152,28 @@ impl Default for Heart {
 
 impl Heart {
     /// A terrain without any loaded chunk. `meshing`: whether chunks are meshed at all.
-    pub(crate) fn new(settings: SamplingSettings, isovalue: f32, normals: bool, colors: Colors, meshing: bool) -> Self {
-        Self {
+    pub(crate) fn new(
+        settings: SamplingSettings,
+        method: MeshMethod,
+        normals: bool,
+        colors: Colors,
+        meshing: bool,
+    ) -> Self {
+        let mut heart = Self {
             samples: SampleStore::of(settings.empty_grid()),
             table: ChunkTable::new(settings.extent, meshing),
             sampling_settings: Some(settings),
-            isovalue,
+            method,
             appearance: Appearance::new(normals, colors),
             ..Self::default()
-        }
+        };
+        heart.follow_method();
+        heart
     }
 
     /// Replaces all samples by those of another source. Edits are lost; a drawn chunk stays until its new mesh is
     /// there. The chunks stay where they are.
-    pub(crate) fn refill(&mut self, settings: SamplingSettings, isovalue: f32) {
+    pub(crate) fn refill(&mut self, settings: SamplingSettings, method: MeshMethod) {
         self.samples.refill(settings.empty_grid());
         self.table.refill();
         self.groups.take_all();
@@ -176,8 +184,9 @@ impl Heart {
         self.bounds.clear();
         self.deferred_fills.clear();
         self.deferred_meshes.clear();
-        (self.sampling, self.has_shown, self.isovalue) = (0, false, isovalue);
-        (self.transition, self.next_isovalue) = (None, None);
+        (self.sampling, self.has_shown, self.method) = (0, false, method);
+        (self.transition, self.next_method) = (None, None);
+        self.follow_method();
         self.sampling_settings = Some(settings);
         let Self { table, arriving, cover, .. } = self;
         table.keys().for_each(|key| arriving.add(key, cover));
@@ -217,7 +226,12 @@ impl Heart {
 
     /// The isovalue as drawn, in voxels.
     pub(crate) const fn isovalue(&self) -> f32 {
-        self.isovalue
+        self.method.isovalue()
+    }
+
+    /// The isovalue and the mesher as drawn.
+    pub(crate) const fn mesh_method(&self) -> MeshMethod {
+        self.method
     }
 
     /// The queue of results from sampling jobs.
@@ -231,8 +245,8 @@ impl Heart {
     }
 
     /// The settings of meshes that start now.
-    pub(crate) fn mesh_settings(&self) -> MeshSettings {
-        MeshSettings { isovalue: self.isovalue, normals: self.appearance.normals, ..MeshSettings::default() }
+    pub(crate) const fn mesh_settings(&self) -> MeshMethod {
+        self.method.with_normals(self.appearance.normals)
     }
 
     /// The colours of meshes that start now.

@@ -15,7 +15,7 @@ use crate::source::{HeightMap, HeightMapSettings};
 use crate::source::{
     Landscape, LandscapeSettings, NoiseDensity, NoiseDensitySettings, NoiseHeights, NoiseHeightsSettings,
 };
-use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainLevels};
+use crate::terrain::{Extent, Keep, Palette, SourceHandle, Terrain, TerrainLevels, TerrainMesher};
 
 /// A description of a terrain: plain data, read from a file or written in code, kept as an asset.
 #[derive(Asset, Reflect, Serialize, Deserialize, Clone, Debug, PartialEq)]
@@ -39,6 +39,9 @@ pub struct TerrainDescription {
     /// Sets [`Terrain::levels`]. Default: one level.
     #[serde(default)]
     pub levels: TerrainLevels,
+    /// Sets [`Terrain::mesher`]. Default: the primal one.
+    #[serde(default)]
+    pub mesher: TerrainMesher,
 }
 
 /// A description of a terrain's source: its samples before it is edited.
@@ -91,6 +94,7 @@ impl TerrainDescription {
             extent: default_extent(),
             keep: Keep::default(),
             levels: TerrainLevels::default(),
+            mesher: TerrainMesher::default(),
         }
     }
 
@@ -153,6 +157,9 @@ impl TerrainDescription {
         }
         if before.is_none_or(|before| before.levels != self.levels) {
             next.levels = self.levels;
+        }
+        if before.is_none_or(|before| before.mesher != self.mesher) {
+            next.mesher = self.mesher;
         }
         next.check()?;
         *terrain = next;

@@ -11,7 +11,7 @@ use bevy_math::bounding::Aabb3d;
 use bevy_mesh::{Indices, Mesh, PrimitiveTopology};
 use bevy_platform::time::Instant;
 use bevy_tasks::ComputeTaskPool;
-use marchless::{MeshBuffer, MeshSettings};
+use marchless::{MeshBuffer, MeshMethod};
 
 use super::ATTRIBUTE_MATERIAL;
 use super::pool::{MeshPool, PooledAsset, PooledMesh};
@@ -34,7 +34,7 @@ pub(crate) struct AssetStyle {
 pub(crate) fn mesh_chunk(
     input: &MeshInput,
     key: ChunkKey,
-    settings: &MeshSettings,
+    settings: &MeshMethod,
     style: Option<&AssetStyle>,
     pool: Option<&MeshPool>,
 ) -> ChunkMesh {
@@ -44,7 +44,7 @@ pub(crate) fn mesh_chunk(
 /// Meshes chunks and waits for them, with the help of the compute pool if there is one. Meshes are sorted by key.
 pub(crate) fn mesh_now(
     chunks: &[(ChunkKey, MeshInput)],
-    settings: &MeshSettings,
+    settings: &MeshMethod,
     style: Option<&AssetStyle>,
     pool: &MeshPool,
 ) -> Vec<ChunkMesh> {

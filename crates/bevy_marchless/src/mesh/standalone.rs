@@ -10,14 +10,14 @@ use bevy_math::UVec3;
 use bevy_mesh::Mesh3d;
 use bevy_reflect::prelude::*;
 use bevy_transform::components::Transform;
-use marchless::{MeshSettings, Samples, SamplesError, Shape, ShapeError, Weight};
+use marchless::{MeshMethod, Samples, SamplesError, Shape, ShapeError, Weight};
 use thiserror::Error;
 
 use super::MeshPresenter;
 use super::job::mesh_with;
 use crate::chunk::{ChunkGeometry, ChunkKey};
 use crate::jobs::{Priority, Results, Ticket, WorkQueue};
-use crate::terrain::Palette;
+use crate::terrain::{Palette, TerrainMesher};
 use crate::volume::ChunkMesh;
 
 /// A standalone chunk: samples that you insert on any entity. The plugin meshes them, and again after each change.
@@ -46,6 +46,9 @@ pub struct ChunkSamples {
     data: SharedSamples,
     /// The surface lies where the weight equals this. [Limit: finite] [Units: voxels] Default: 0.
     pub isovalue: f32,
+    /// How the samples become triangles. Default: with the primal mesher. With the dual one, the surface ends up to one
+    /// cell before the samples' border; more than 8 steps of smoothing are an error in the log, and give no mesh.
+    pub mesher: TerrainMesher,
     /// Whether the mesh has normals. Default: true.
     pub normals: bool,
     /// The colours of the materials.
@@ -158,7 +161,7 @@ impl ChunkSamples {
     /// A job that meshes the current samples.
     fn mesh_job(&self, presenter: &MeshPresenter) -> impl FnOnce() -> ChunkMesh + Send + 'static {
         let SharedSamples(data) = self.data.clone();
-        let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
+        let method = self.mesher.method(self.isovalue).with_normals(self.normals);
         let style = presenter.style(&Arc::new(self.palette.to_vertex_colors()));
         move || {
             let zeros;
@@ -172,7 +175,10 @@ impl ChunkSamples {
                 .and_then(|samples| samples.with_materials(materials))
                 .expect("the lengths have been checked");
             mesh_with(ChunkKey::finest([0; 3]), style.as_ref(), None, |scratch, out| {
-                Ok(scratch.mesher.mesh(samples, &settings, out)?)
+                Ok(match &method {
+                    MeshMethod::Primal(settings) => scratch.mesher.mesh(samples, settings, out)?,
+                    MeshMethod::Dual(settings) => scratch.mesher.mesh_dual(samples, settings, out)?,
+                })
             })
         }
     }
@@ -181,7 +187,13 @@ impl ChunkSamples {
 /// Air, of 2 × 2 × 2 samples.
 impl Default for ChunkSamples {
     fn default() -> Self {
-        Self { data: SharedSamples::default(), isovalue: 0.0, normals: true, palette: Palette::default() }
+        Self {
+            data: SharedSamples::default(),
+            isovalue: 0.0,
+            mesher: TerrainMesher::default(),
+            normals: true,
+            palette: Palette::default(),
+        }
     }
 }
 

@@ -56,7 +56,7 @@ pub(crate) fn prepare_terrains(
                     if before.voxel_size != terrain.voxel_size {
                         place_chunks(&terrain, volume.heart(), &mut transforms);
                     }
-                    volume.heart_mut().refill(terrain.sampling_settings(), terrain.isovalue);
+                    volume.heart_mut().refill(terrain.sampling_settings(), terrain.mesh_method());
                     follow_settings(&mut volume);
                 }
                 _ => {
@@ -72,24 +72,29 @@ pub(crate) fn prepare_terrains(
 /// Applies all settings that do not change the samples.
 fn follow_settings(volume: &mut TerrainVolume) {
     let Some(settings) = volume.settings() else { return };
-    let (isovalue, normals, colors) = (settings.isovalue, settings.normals, settings.palette.to_vertex_colors());
+    let (method, normals, colors) = (settings.mesh_method(), settings.normals, settings.palette.to_vertex_colors());
     let (extent, levels) = (settings.chunk_region(), settings.levels.detail());
     let heart = volume.heart_mut();
     if heart.extent() != Some(extent) {
         heart.resize(extent);
     }
     heart.set_levels(levels);
-    if heart.mesh_settings().normals != normals || **heart.colors() != colors {
+    if heart.mesh_settings().normals() != normals || **heart.colors() != colors {
         heart.set_appearance(normals, Arc::new(colors));
     }
-    heart.set_isovalue(isovalue);
+    heart.set_mesh_method(method);
 }
 
 /// Replaces the whole heart and despawns all chunks; chunks in the load regions are loaded anew.
 fn start_over(terrain: &Terrain, volume: &mut TerrainVolume, meshing: bool, commands: &mut Commands) {
     let colors = Arc::new(terrain.palette.to_vertex_colors());
-    let former =
-        volume.start_over(Heart::new(terrain.sampling_settings(), terrain.isovalue, terrain.normals, colors, meshing));
+    let former = volume.start_over(Heart::new(
+        terrain.sampling_settings(),
+        terrain.mesh_method(),
+        terrain.normals,
+        colors,
+        meshing,
+    ));
     despawn_chunks(former, commands);
 }
 

@@ -153,7 +153,7 @@ impl Heart {
             && let Some(chunk) = self.bound(key.position)
         {
             stats.bounded += 1;
-            let signs = KnownSigns::of(&chunk, self.isovalue);
+            let signs = KnownSigns::of(&chunk, self.isovalue());
             self.take_in(key, chunk, signs, None);
         } else {
             self.table.queue(key);
@@ -221,7 +221,7 @@ impl Heart {
             source: settings.source.clone(),
             cells: settings.cells,
             spacing: settings.spacing,
-            isovalue: self.isovalue,
+            isovalue: self.isovalue(),
             replay: self.samples.replay(position, settings.empty_grid()),
             urgency,
         }

@@ -107,8 +107,9 @@ impl Heart {
         if self.levels.is_some() {
             return self.restart_levels();
         }
+        let layers = self.layers_at_border();
         let is_inner = |key: &ChunkKey, region: Region| {
-            (0..3).all(|axis| (region.min[axis] + 1..region.max[axis] - 1).contains(&key.position[axis]))
+            (0..3).all(|axis| (region.min[axis] + layers..region.max[axis] - layers).contains(&key.position[axis]))
         };
         let keys: Vec<ChunkKey> =
             self.table.keys().filter(|key| !is_inner(key, former) || !is_inner(key, extent)).collect();

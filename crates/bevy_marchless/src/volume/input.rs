@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, OnceLock};
 
 use marchless::{
-    Block, Grid, LeafBlock, LeafKey, LevelChange, LevelCover, LevelSource, MeshBuffer, MeshSettings, Mesher,
+    Block, Grid, LeafBlock, LeafKey, LevelChange, LevelCover, LevelSource, MeshBuffer, MeshMethod, Mesher,
     Neighbourhood, QuantisedStamp, Region, Source,
 };
 
@@ -68,13 +68,16 @@ impl MeshInput {
     pub(crate) fn mesh(
         &self,
         scratch: &mut MeshScratch,
-        settings: &MeshSettings,
+        method: &MeshMethod,
         out: &mut MeshBuffer,
     ) -> Result<(), Box<dyn Error>> {
         let MeshScratch { mesher, block, leaf } = scratch;
         match self {
-            Self::Finest(samples) => samples.view().mesh(mesher, block, settings, out)?,
+            Self::Finest(samples) => samples.view().mesh(mesher, block, method, out)?,
             Self::Coarser(input) => {
+                let MeshMethod::Primal(settings) = method else {
+                    return Err("coarser levels of detail have primal meshes only".into());
+                };
                 input.fill(leaf, settings.isovalue)?;
                 mesher.mesh_leaf(&leaf.samples()?, settings, out)?;
             }

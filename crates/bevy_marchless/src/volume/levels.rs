@@ -378,7 +378,8 @@ impl Heart {
     fn drop_leaves(&mut self) {
         self.groups.take_all();
         if let Some(transition) = self.transition.take() {
-            self.isovalue = self.next_isovalue.take().unwrap_or(transition.isovalue());
+            self.method = self.next_method.take().unwrap_or(transition.method());
+            self.follow_method();
         }
         self.arriving.clear();
         self.to_fill.clear();

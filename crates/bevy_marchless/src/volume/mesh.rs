@@ -27,7 +27,7 @@ pub(crate) struct PreparedGroup {
 pub(crate) enum MeshResult {
     /// A chunk of the group with this number.
     OfGroup(u64, ChunkMesh),
-    /// A chunk meshed for the isovalue to come.
+    /// A chunk meshed for the isovalue or the mesher to come.
     Restyled(Restyled),
     /// A leaf of a change of levels.
     OfLevels(LevelMesh),
@@ -73,7 +73,7 @@ impl Heart {
                 // It is drawn with its set, and visited again then.
                 continue;
             }
-            let is_empty = self.table.is_without_surface(key, self.isovalue)
+            let is_empty = self.table.is_without_surface(key, self.isovalue())
                 || is_uniform_around(self.samples.newest(), key.position);
             if !is_empty {
                 self.to_mesh.add(key, &self.cover);

@@ -1,16 +1,16 @@
-//! Colours, normals and isovalue change.
+//! Colours, normals, isovalue and mesher change.
 //!
 //! New colours and normals *sweep* over the chunks one by one, since borders stay closed meanwhile. Colours need no new
-//! geometry. Another isovalue moves the whole surface: all chunks are meshed beside the drawn ones, and swapped in one
-//! update, the *transition*. A stamp meanwhile is shown at the former isovalue, and its chunks are meshed again for the
-//! new one. Settings that change before the transition ends wait for it, so that something is shown however often they
-//! change.
+//! geometry. Another isovalue or mesher moves the whole surface: all chunks are meshed beside the drawn ones, and swapped
+//! in one update, the *transition*. A stamp meanwhile is shown with the former one, and its chunks are meshed again for
+//! the new one. Settings that change before the transition ends wait for it, so that something is shown however often
+//! they change.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use bevy_platform::collections::HashSet;
-use marchless::{MeshBuffer, MeshSettings};
+use marchless::{MeshBuffer, MeshMethod};
 
 use super::mesh::{PreparedGroup, Shown, is_uniform_around};
 use super::{ChunkMesh, Colors, Group, Heart, Purpose};
@@ -18,7 +18,7 @@ use crate::chunk::ChunkKey;
 use crate::cover::UniqueQueue;
 use crate::jobs::{Ticket, new_number};
 
-/// The appearance of meshes, apart from the isovalue.
+/// The appearance of meshes, apart from the isovalue and the mesher.
 pub(super) struct Appearance {
     /// The number that tells appearances apart.
     pub(super) number: u64,
@@ -38,9 +38,9 @@ impl Default for Appearance {
     }
 }
 
-/// A running change of the isovalue. Every shown leaf is waiting, lacks samples, is being meshed, or is done.
+/// A running change of the isovalue or the mesher. Every shown leaf is waiting, lacks samples, is being meshed, or is done.
 pub(super) struct Transition {
-    isovalue: f32,
+    method: MeshMethod,
     waiting: UniqueQueue,
     /// The leaves whose neighbours are not all filled.
     lacking: HashSet<ChunkKey>,
@@ -50,8 +50,8 @@ pub(super) struct Transition {
 }
 
 impl Transition {
-    pub(super) const fn isovalue(&self) -> f32 {
-        self.isovalue
+    pub(super) const fn method(&self) -> MeshMethod {
+        self.method
     }
 
     pub(super) fn waiting(&self) -> usize {
@@ -59,7 +59,7 @@ impl Transition {
     }
 }
 
-/// A chunk meshed for the isovalue to come.
+/// A chunk meshed for the isovalue or the mesher to come.
 pub(crate) struct Restyled {
     pub(crate) job: u64,
     pub(crate) meshed: ChunkMesh,
@@ -134,31 +134,50 @@ impl Heart {
         }
     }
 
-    /// Changes the isovalue, once every drawn chunk has been meshed for it.
-    pub(crate) fn set_isovalue(&mut self, isovalue: f32) {
+    /// Changes the isovalue and the mesher, once every drawn chunk has been meshed for them. `method` has normals.
+    pub(crate) fn set_mesh_method(&mut self, method: MeshMethod) {
         match &self.transition {
-            Some(transition) => self.next_isovalue = Some(isovalue).filter(|next| *next != transition.isovalue),
-            None if isovalue != self.isovalue => self.begin_transition(isovalue),
+            Some(transition) => self.next_method = Some(method).filter(|next| *next != transition.method),
+            None if method != self.method => self.begin_transition(method),
             None => {}
         }
     }
 
-    fn begin_transition(&mut self, isovalue: f32) {
+    fn begin_transition(&mut self, method: MeshMethod) {
         let mut waiting = UniqueQueue::default();
         self.table.keys().filter(|key| self.table.is_shown(*key)).for_each(|key| waiting.push(key));
         if waiting.is_empty() {
-            self.isovalue = isovalue;
+            self.method = method;
+            self.follow_method();
             self.restart_level_meshes();
-            // Chunks that are being meshed for the first time have the former isovalue.
+            // Chunks that are being meshed for the first time have the former isovalue or mesher.
             self.restart_groups();
             return;
         }
         let (lacking, running, done) = (HashSet::default(), HashMap::new(), HashMap::new());
-        self.transition = Some(Transition { isovalue, waiting, lacking, running, done });
+        self.transition = Some(Transition { method, waiting, lacking, running, done });
+        self.follow_method();
     }
 
-    /// Takes in that a chunk's samples, or its shown state, have changed: its mesh for the isovalue to come is out of
-    /// date.
+    /// Lets edits reach as far as meshes read: those that are drawn, and those to come.
+    pub(super) fn follow_method(&mut self) {
+        let widest = self.methods().max_by_key(MeshMethod::margins).unwrap_or(self.method);
+        self.samples.set_mesh_method(widest);
+    }
+
+    /// The layers of chunks at the terrain's border whose meshes depend on where it is. Those of the dual mesher reach
+    /// into a second one if chunks are small.
+    pub(super) fn layers_at_border(&self) -> i32 {
+        if self.methods().any(|method| matches!(method, MeshMethod::Dual(_))) { 2 } else { 1 }
+    }
+
+    /// The methods of the meshes that are drawn, and of those to come.
+    fn methods(&self) -> impl Iterator<Item = MeshMethod> {
+        [Some(self.method), self.transition.as_ref().map(Transition::method)].into_iter().flatten()
+    }
+
+    /// Takes in that a chunk's samples, or its shown state, have changed: its mesh for the isovalue and the mesher to come is
+    /// out of date.
     pub(super) fn renew_in_transition(&mut self, key: ChunkKey) {
         if let Some(transition) = &mut self.transition
             && self.table.is_shown(key)
@@ -196,10 +215,10 @@ impl Heart {
         }
     }
 
-    /// The next chunk to be meshed for the isovalue to come, while at most `limit` are under way: its job's number, and
-    /// the settings of its mesh.
-    pub(crate) fn next_in_transition(&mut self, limit: usize) -> Option<(ChunkKey, u64, MeshSettings)> {
-        let settings = self.mesh_settings();
+    /// The next chunk to be meshed for the transition, while at most `limit` are under way: its job's number, and the
+    /// settings of its mesh.
+    pub(crate) fn next_in_transition(&mut self, limit: usize) -> Option<(ChunkKey, u64, MeshMethod)> {
+        let normals = self.appearance.normals;
         loop {
             let transition = self.transition.as_mut().filter(|transition| transition.running.len() < limit)?;
             let key = transition.waiting.pop()?;
@@ -212,7 +231,7 @@ impl Heart {
             } else if key.level == 0 && is_uniform_around(self.samples.newest(), key.position) {
                 transition.done.insert(key, (ChunkMesh::empty(key), self.appearance.number));
             } else {
-                return Some((key, new_number(), MeshSettings { isovalue: transition.isovalue, ..settings }));
+                return Some((key, new_number(), transition.method.with_normals(normals)));
             }
         }
     }
@@ -222,14 +241,14 @@ impl Heart {
         self.appearance.number
     }
 
-    /// Notes that a chunk is being meshed for the isovalue to come.
+    /// Notes that a chunk is being meshed for the transition.
     pub(crate) fn started_in_transition(&mut self, key: ChunkKey, job: u64, ticket: Ticket) {
         if let Some(transition) = &mut self.transition {
             transition.running.insert(key, (job, ticket));
         }
     }
 
-    /// Takes in a chunk that a job has meshed for the isovalue to come.
+    /// Takes in a chunk that a job has meshed for the transition.
     pub(crate) fn take_restyled(&mut self, restyled: Restyled) {
         let Restyled { job, meshed, appearance } = restyled;
         let key = meshed.key;
@@ -249,7 +268,7 @@ impl Heart {
         }) && !self.groups.makes_place()
     }
 
-    /// Takes in a chunk that was meshed at once for the isovalue to come.
+    /// Takes in a chunk that was meshed at once for the transition.
     pub(crate) fn meshed_in_transition(&mut self, meshed: ChunkMesh) {
         let appearance = self.appearance.number;
         if let Some(transition) = &mut self.transition {
@@ -257,12 +276,13 @@ impl Heart {
         }
     }
 
-    /// Shows all chunks at the new isovalue, if none is missing. They show the newest samples, including chunks that
-    /// were still to be meshed at the former isovalue.
+    /// Shows all chunks as meshed for the transition, if none is missing. They show the newest samples, including chunks
+    /// that were still to be meshed with the former isovalue or mesher.
     pub(crate) fn end_transition(&mut self) -> Option<Shown> {
         let is_done = |transition: &mut Transition| transition.waiting() == 0;
-        let Transition { isovalue, done, .. } = self.transition.take_if(is_done)?;
-        self.isovalue = isovalue;
+        let Transition { method, done, .. } = self.transition.take_if(is_done)?;
+        self.method = method;
+        self.follow_method();
         self.restart_level_meshes();
         let mut shown = Shown::default();
         let groups = self.groups.take_all();
@@ -287,8 +307,8 @@ impl Heart {
             }
         }
         shown.since = groups.into_iter().filter_map(|pending| pending.since).collect();
-        if let Some(next) = self.next_isovalue.take() {
-            self.set_isovalue(next);
+        if let Some(next) = self.next_method.take() {
+            self.set_mesh_method(next);
         }
         Some(shown)
     }

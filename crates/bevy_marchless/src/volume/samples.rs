@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use bevy_platform::collections::HashMap;
 use marchless::{
-    DEFAULT_CHUNK_CELLS, Edit, Grid, GridChunk, LeafKey, NeighbourhoodView, QuantisedStamp, Region, SamplePool,
+    DEFAULT_CHUNK_CELLS, Edit, Grid, GridChunk, LeafKey, MeshMethod, NeighbourhoodView, QuantisedStamp, Region,
+    SamplePool,
 };
 
 use super::stamps::{LoggedStamp, StampLog};
@@ -161,6 +162,11 @@ impl SampleStore {
         for grid in [&mut self.newest, &mut self.shown] {
             grid.set_bounds(Some(extent)).expect("the settings have been checked");
         }
+    }
+
+    /// Sets how chunks are meshed, which decides how far an edit reaches.
+    pub(super) fn set_mesh_method(&mut self, method: MeshMethod) {
+        self.newest.set_mesh_method(method).expect("the settings have been checked");
     }
 
     /// Starts over with another source: all edits are lost. Shown samples stay.

@@ -1,5 +1,6 @@
 //! Random events, until nothing waits: no app, no window, no entity but a number.
 
+mod events;
 mod levels;
 
 use std::collections::HashMap;
@@ -8,8 +9,8 @@ use std::time::Duration;
 use bevy_ecs::entity::Entity;
 use bevy_platform::time::Instant;
 use marchless::{
-    Bound, Grid, LeafKey, MeshBuffer, MeshSettings, Operation, QuantisedShape, QuantisedStamp, Region, SamplePool,
-    SourceRegion,
+    Bound, DualSettings, Grid, LeafKey, MeshBuffer, MeshSettings, MeshUnion, Operation, QuantisedShape, QuantisedStamp,
+    Region, SamplePool, SourceRegion,
 };
 use proptest::prelude::*;
 
@@ -17,6 +18,7 @@ use super::*;
 use crate::cover::{LoadRegion, View};
 use crate::jobs::{Priority, WorkQueue, do_next};
 use crate::stats::TerrainStats;
+use events::{Event, event, event_of_surface};
 
 const CELLS: u32 = 8;
 /// Of every extent.
@@ -29,38 +31,6 @@ const EXTENTS: [Region; 5] = [
     Region { min: [-1, -1, 0], max: [0, 1, 4] },
     Region { min: [-3, -2, -3], max: [3, 6, 3] },
 ];
-
-/// What happens to a terrain. Lengths in chunks.
-#[derive(Clone, Debug)]
-enum Event {
-    View { viewer: u32, view: Option<([f64; 3], f64, f64, Option<f64>)> },
-    QuantisedStamp { center: [f64; 3], radius: f64, add: bool },
-    Despawn { index: usize },
-    Source { shift: f64 },
-    Colors,
-    Normals,
-    Isovalue { isovalue: f32 },
-    Extent { index: usize },
-    Update { jobs: usize, inline: usize, late: bool },
-}
-
-fn event() -> impl Strategy<Value = Event> {
-    let place = || (-3.0..4.0f64, -1.5..1.5f64, -3.0..4.0f64).prop_map(|(x, y, z)| [x, y, z]);
-    let view = (place(), 0.2..2.4f64, 0.0..1.2f64, prop::option::of(0.0..1.5f64));
-    prop_oneof![
-        4 => (0u32..3, prop::option::weighted(0.8, view)).prop_map(|(viewer, view)| Event::View { viewer, view }),
-        6 => (place(), 0.1..1.5f64, any::<bool>())
-            .prop_map(|(center, radius, add)| Event::QuantisedStamp { center, radius, add }),
-        1 => (0usize..100).prop_map(|index| Event::Despawn { index }),
-        1 => (-4.0..4.0f64).prop_map(|shift| Event::Source { shift }),
-        1 => Just(Event::Colors),
-        1 => Just(Event::Normals),
-        1 => (-1.5f32..1.5).prop_map(|isovalue| Event::Isovalue { isovalue }),
-        2 => (0usize..4).prop_map(|index| Event::Extent { index }),
-        12 => (0usize..30, prop_oneof![Just(0usize), Just(8)], any::<bool>())
-            .prop_map(|(jobs, inline, late)| Event::Update { jobs, inline, late }),
-    ]
-}
 
 /// A terrain with all that is around it in a game.
 struct Game {
@@ -79,6 +49,10 @@ struct Game {
     levels: Option<LevelDetail>,
     normals: bool,
     isovalue: f32,
+    /// The steps of smoothing of the dual mesher; `None` with the primal one.
+    smoothing: Option<u32>,
+    /// Whether all that is drawn is one surface, which holds in every update from then on.
+    is_surface: bool,
 }
 
 /// Rolling ground around a height.
@@ -113,7 +87,7 @@ impl Game {
     fn new() -> Self {
         let settings = sampling_settings(0.0, WHOLE);
         Self {
-            heart: Heart::new(settings.clone(), 0.0, true, colors(), true),
+            heart: Heart::new(settings.clone(), MeshMethod::default(), true, colors(), true),
             queue: WorkQueue::default(),
             stats: TerrainStats::default(),
             screen: HashMap::new(),
@@ -126,6 +100,17 @@ impl Game {
             levels: None,
             normals: true,
             isovalue: 0.0,
+            smoothing: None,
+            is_surface: false,
+        }
+    }
+
+    /// The mesher and the isovalue that are asked for.
+    fn method(&self) -> MeshMethod {
+        let isovalue = self.isovalue;
+        match self.smoothing {
+            None => MeshMethod::Primal(MeshSettings { isovalue, ..MeshSettings::default() }),
+            Some(smoothing) => MeshMethod::Dual(DualSettings { isovalue, smoothing, ..DualSettings::default() }),
         }
     }
 
@@ -157,7 +142,7 @@ impl Game {
             Event::Source { shift } => {
                 if self.heart.is_generation_shown() {
                     self.settings = sampling_settings(shift, self.settings.extent);
-                    self.heart.refill(self.settings.clone(), self.isovalue);
+                    self.heart.refill(self.settings.clone(), self.method());
                     self.stamps.clear();
                     self.waiting.clear();
                 }
@@ -169,7 +154,13 @@ impl Game {
             }
             Event::Isovalue { isovalue } => {
                 self.isovalue = isovalue;
-                self.heart.set_isovalue(isovalue);
+                self.heart.set_mesh_method(self.method());
+            }
+            // Terrains with several levels are meshed with the primal mesher only.
+            Event::Mesher { .. } if self.levels.is_some() => {}
+            Event::Mesher { smoothing } => {
+                self.smoothing = smoothing;
+                self.heart.set_mesh_method(self.method());
             }
             Event::Extent { index } => {
                 self.settings.extent = EXTENTS[index];
@@ -373,6 +364,9 @@ impl Game {
         if let Some(levels) = &heart.levels {
             self.check_levels(levels);
         }
+        if self.is_surface {
+            self.check_surface();
+        }
         let drawn: HashMap<_, _> = heart.table.entities().map(|(key, entity)| (entity, key)).collect();
         assert_eq!(drawn.len(), self.screen.len(), "what is drawn is on the screen");
         for (entity, key) in drawn {
@@ -394,6 +388,26 @@ impl Game {
         }
     }
 
+    /// Checks that all meshes on the screen form one closed surface, bit for bit. Vertices that smoothing has moved to one
+    /// point count as one.
+    fn check_surface(&self) {
+        let mut union = MeshUnion::new();
+        for (key, mesh) in self.screen.values() {
+            union.add(mesh, key.position.map(|v| i64::from(v) * i64::from(CELLS)), key.level);
+        }
+        // Each edge is passed as often in one direction as in the other.
+        let mut passes = HashMap::<[u32; 2], i32>::new();
+        let (_, indices) = union.weld();
+        for triangle in indices.chunks_exact(3) {
+            for [from, to] in [0, 1, 2].map(|corner| [triangle[corner], triangle[(corner + 1) % 3]]) {
+                let (edge, step) = if from < to { ([from, to], 1) } else { ([to, from], -1) };
+                *passes.entry(edge).or_default() += step;
+            }
+        }
+        let open = passes.values().filter(|passes| **passes != 0).count();
+        assert!(open == 0, "{open} open edges");
+    }
+
     /// Updates until nothing waits; then everything is as if it had always been so.
     fn follow_residency(&mut self) {
         for _ in 0..2_000 {
@@ -408,7 +422,7 @@ impl Game {
     fn check_settled(&self) {
         let heart = &self.heart;
         assert_eq!(heart.coverage().waiting, 0);
-        assert_eq!(heart.isovalue(), self.isovalue);
+        assert_eq!(heart.mesh_method(), self.method());
         assert!(heart.is_generation_shown() && heart.sampling == 0 && heart.groups.is_empty());
         let extent = self.settings.extent;
         let is_there = |key: ChunkKey| !LeafKey::from(key).region().intersection(&extent).is_empty();
@@ -421,8 +435,8 @@ impl Game {
                 fresh.apply_to_chunk(position, stamp, &mut SamplePool::new());
             }
         }
-        let settings = MeshSettings { isovalue: self.isovalue, normals: self.normals, ..MeshSettings::default() };
-        if let Some(levels) = &heart.levels {
+        let method = self.method().with_normals(self.normals);
+        if let (Some(levels), MeshMethod::Primal(settings)) = (&heart.levels, method) {
             return self.check_settled_levels(levels, &fresh, &settings);
         }
         for position in extent.points() {
@@ -438,7 +452,7 @@ impl Game {
             let is_despawned = self.despawned.contains(&key) && heart.entity(key).is_none();
             if let Some(state) = state.filter(|_| !is_despawned) {
                 let input = MeshInput::Finest(Box::new(fresh.neighbourhood_view(position).to_neighbourhood()));
-                let expected = meshed(&input, key, &settings).geometry;
+                let expected = meshed(&input, key, &method).geometry;
                 let wanted = if expected.is_empty() { LeafState::Empty } else { LeafState::Drawn };
                 assert_eq!(state, wanted, "{position:?}");
                 if let Some(drawn) = heart.table.drawn(key).filter(|drawn| !drawn.geometry.is_empty()) {
@@ -450,9 +464,9 @@ impl Game {
     }
 }
 
-fn meshed(input: &MeshInput, key: ChunkKey, settings: &MeshSettings) -> ChunkMesh {
+fn meshed(input: &MeshInput, key: ChunkKey, method: &MeshMethod) -> ChunkMesh {
     let mut geometry = MeshBuffer::new();
-    input.mesh(&mut MeshScratch::default(), settings, &mut geometry).expect("samples of a chunk");
+    input.mesh(&mut MeshScratch::default(), method, &mut geometry).expect("samples of a chunk");
     ChunkMesh { geometry: Arc::new(geometry), ..ChunkMesh::empty(key) }
 }
 
@@ -471,6 +485,21 @@ proptest! {
             game.happen(event);
         }
         game.follow_residency();
+    }
+
+    #[test]
+    fn the_surface_is_closed_in_every_update(events in prop::collection::vec(event_of_surface(), 1..60)) {
+        let mut game = Game::new();
+        game.settings.extent = Region::new([-1; 3], [1; 3]);
+        game.heart.resize(game.settings.extent);
+        game.happen(&Event::View { viewer: 0, view: Some(([0.0; 3], 4.0, 0.0, None)) });
+        game.follow_residency();
+        game.is_surface = true;
+        for event in &events {
+            game.happen(event);
+        }
+        game.follow_residency();
+        prop_assert!(game.heart.coverage().waiting == 0 && game.settings.extent.points().all(|chunk| game.heart.leaf_at(chunk).is_some()));
     }
 
     #[test]

@@ -37,6 +37,11 @@ fn samples_by_hand_get_a_mesh_and_another_after_each_change() {
     app.update();
     assert_eq!(heights(&app, entity), vec![4.75; 81]);
 
+    // The dual mesher has a vertex in each of the 8 × 8 cells.
+    app.world_mut().get_mut::<ChunkSamples>(entity).unwrap().mesher = DualMesher { smoothing: 3 }.into();
+    app.update();
+    assert_eq!(heights(&app, entity), vec![4.75; 64]);
+
     app.world_mut().entity_mut(entity).insert(plane(9, 100.0));
     app.update();
     assert!(app.world().get::<Mesh3d>(entity).is_none(), "all is solid");

@@ -168,14 +168,18 @@ fn description() -> impl Strategy<Value = TerrainDescription> {
         falloff,
         hysteresis,
     });
-    let all = (source, palette, 1e-3f32..1e3, extent(), keep(), levels);
-    all.prop_map(|(source, palette, voxel_size, extent, keep, levels)| TerrainDescription {
+    let smoothing = prop_oneof![Just(0u32), 0..12u32];
+    let mesher =
+        prop_oneof![Just(TerrainMesher::Primal), smoothing.prop_map(|smoothing| DualMesher { smoothing }.into())];
+    let all = (source, palette, 1e-3f32..1e3, extent(), keep(), levels, mesher);
+    all.prop_map(|(source, palette, voxel_size, extent, keep, levels, mesher)| TerrainDescription {
         source,
         palette,
         voxel_size,
         extent,
         keep,
         levels,
+        mesher,
     })
 }
 
@@ -309,6 +313,8 @@ fn settings_out_of_range_are_refused_with_their_lines() {
     for (text, lines, words) in [
         ("(source: Air,\nvoxel_size: -0.1)", &[2][..], "line 2: a terrain's voxel size"),
         ("(source: Air, levels: (count: 8))", &[], "levels.count"),
+        ("(source: Air, mesher: Dual(smoothing: 9))", &[], "0 to 8 steps"),
+        ("(source: Air, mesher: Dual(), levels: (count: 2))", &[], "one level of detail"),
         ("(source: Air, extent: (y: (0, 4)))", &[], "keep"),
         ("(source: Air, extent: (y: (4, 4)), keep: Nothing)", &[], "extent"),
     ] {

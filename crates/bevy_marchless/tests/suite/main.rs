@@ -34,6 +34,7 @@ mod many;
 #[cfg(feature = "pbr")]
 mod materials;
 mod mesh_usages;
+mod mesher;
 mod meshes;
 mod observers;
 mod parts;

@@ -87,7 +87,7 @@ impl Heart {
         let all: Vec<ChunkKey> = if makes_meshes { running.members().collect() } else { Vec::new() };
         let is_empty = |key: &ChunkKey| {
             key.level == 0
-                && (self.table.is_without_surface(*key, self.isovalue)
+                && (self.table.is_without_surface(*key, self.isovalue())
                     || is_uniform_around(self.samples.newest(), key.position))
         };
         let (empty, to_mesh): (Vec<ChunkKey>, Vec<ChunkKey>) = all.iter().partition(|key| is_empty(key));

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy_platform::collections::HashSet;
-use marchless::{LeafBlock, LevelCover, LevelSource, MeshUnion, Mesher};
+use marchless::{LeafBlock, LevelCover, LevelSource, Mesher};
 
 use super::super::levels::Levels;
 use super::*;
@@ -32,7 +32,7 @@ impl Game {
         self.waiting.clear();
         self.screen.clear();
         self.despawned.clear();
-        self.heart = Heart::new(self.settings.clone(), self.isovalue, self.normals, colors(), true);
+        self.heart = Heart::new(self.settings.clone(), self.method(), self.normals, colors(), true);
         self.heart.set_levels(self.levels);
         self.keep();
         let mut viewers: Vec<u32> = self.views.keys().copied().collect();

@@ -99,8 +99,7 @@ pub fn geometry(app: &mut App, terrain: Entity) -> Vec<(IVec3, Arc<MeshBuffer>)>
 pub fn expected_geometry(app: &App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)> {
     let volume = volume(app, terrain);
     let settings = volume.settings().expect("good settings");
-    let settings =
-        marchless::MeshSettings { isovalue: settings.isovalue, normals: settings.normals, ..Default::default() };
+    let method = settings.mesher.method(settings.isovalue).with_normals(settings.normals);
     let mut mesher = marchless::Mesher::new();
     volume
         .grid()
@@ -109,7 +108,7 @@ pub fn expected_geometry(app: &App, terrain: Entity) -> Vec<(IVec3, MeshBuffer)>
         .points()
         .map(|position| {
             let mut mesh = MeshBuffer::new();
-            volume.grid().mesh_chunk(position, &mut mesher, &settings, &mut mesh).expect("samples of a chunk");
+            volume.grid().mesh_chunk(position, &mut mesher, method, &mut mesh).expect("samples of a chunk");
             (IVec3::from(position), mesh)
         })
         .collect()

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use bevy_marchless::prelude::*;
-use marchless::{Grid, GridChunk, MeshBuffer, MeshSettings, Mesher, Region, SamplePool};
+use marchless::{Grid, GridChunk, MeshBuffer, Mesher, Region, SamplePool};
 
 /// A terrain made with the core only, without entities and tasks.
 pub struct Fresh {
@@ -71,10 +71,9 @@ impl Fresh {
         for neighbour in around(position).intersection(&self.extent()).points() {
             self.chunk(neighbour);
         }
-        let settings =
-            MeshSettings { isovalue: self.terrain.isovalue, normals: self.terrain.normals, ..MeshSettings::default() };
+        let method = self.terrain.mesher.method(self.terrain.isovalue).with_normals(self.terrain.normals);
         let mut mesh = MeshBuffer::new();
-        self.grid.mesh_chunk(position, &mut self.mesher, &settings, &mut mesh).expect("samples of a chunk");
+        self.grid.mesh_chunk(position, &mut self.mesher, method, &mut mesh).expect("samples of a chunk");
         mesh
     }
 }
