@@ -490,7 +490,7 @@ proptest! {
     #[test]
     fn the_surface_is_closed_in_every_update(events in prop::collection::vec(event_of_surface(), 1..60)) {
         let mut game = Game::new();
-        game.settings.extent = Region::new([-1; 3], [1; 3]);
+        game.settings.extent = Region::new([-2, -1, -2], [2, 1, 2]);
         game.heart.resize(game.settings.extent);
         game.happen(&Event::View { viewer: 0, view: Some(([0.0; 3], 4.0, 0.0, None)) });
         game.follow_residency();
@@ -528,6 +528,29 @@ fn another_source_comes_after_the_game_has_despawned_all_there_was() {
         let before = game.heart.samples().generation();
         game.happen(&Event::Source { shift });
         assert_ne!(game.heart.samples().generation(), before);
+        game.follow_residency();
+    }
+}
+
+/// A plate is so thin that a hole changes no sample much beside it, and smoothing moves vertices far beside it.
+#[test]
+fn edits_during_a_change_of_the_mesher_reach_as_far_as_both_read() {
+    for (offset, meshers) in
+        (0..16).map(|i| (f64::from(i / 2) / 8.0, [[None, Some(6)], [Some(6), None]][i as usize % 2]))
+    {
+        let mut game = Game::new();
+        let plate = |[_, y, _]: [f64; 3]| (y - 0.3).abs() - 1.2;
+        let extent = Region::new([-2, -1, -2], [2, 1, 2]);
+        game.settings = SamplingSettings { source: Arc::new(plate), extent, cells: CELLS, spacing: 1.0 };
+        game.smoothing = meshers[0];
+        game.heart = Heart::new(game.settings.clone(), game.method(), true, colors(), true);
+        game.happen(&Event::View { viewer: 0, view: Some(([0.0; 3], 4.0, 0.0, None)) });
+        game.follow_residency();
+        game.is_surface = true;
+        game.happen(&Event::Mesher { smoothing: meshers[1] });
+        (0..5).for_each(|_| game.update(4, 0, false));
+        assert!(game.heart.transition.is_some(), "it is under way");
+        game.happen(&Event::QuantisedStamp { center: [offset, 0.04, 0.4], radius: 0.3, add: false });
         game.follow_residency();
     }
 }
