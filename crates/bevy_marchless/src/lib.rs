@@ -113,7 +113,8 @@ pub mod prelude {
     pub use crate::query::{TerrainHit, TerrainQuery};
     pub use crate::schedule::{MarchlessSettings, MarchlessSystems};
     pub use crate::stream::TerrainViewer;
-    pub use crate::terrain::{DualMesher, Extent, Keep, Palette, Terrain, TerrainLevels, TerrainMesher, TerrainVolume};
+    pub use crate::terrain::{DualMesher, Extent, Keep, Palette, SharpMaterials};
+    pub use crate::terrain::{Terrain, TerrainLevels, TerrainMesher, TerrainVolume};
 }
 
 plugin_group! {

@@ -20,7 +20,7 @@ use thiserror::Error;
 pub use extent::{Extent, Keep};
 pub use handle::{SourceHandle, TerrainSources};
 pub use levels::TerrainLevels;
-pub use mesher::{DualMesher, TerrainMesher};
+pub use mesher::{DualMesher, SharpMaterials, TerrainMesher};
 pub use volume::TerrainVolume;
 
 use crate::chunk::{Chunk, ChunkGeometry};
@@ -263,7 +263,8 @@ impl Terrain {
         // They were checked with the chunk size of `other`. Levels and mesher go together.
         if self.chunk_cells == other.chunk_cells {
             (self.extent, self.keep) = (other.extent, other.keep);
-            (self.levels, self.mesher) = (other.levels, other.mesher);
+            self.levels = other.levels;
+            self.mesher.clone_from(&other.mesher);
         }
         (self.isovalue, self.normals) = (other.isovalue, other.normals);
         self.palette.clone_from(&other.palette);
@@ -343,6 +344,12 @@ pub enum TerrainError {
         found: u32,
         /// The most steps for the terrain's `chunk_cells`.
         most: u32,
+    },
+    /// The dual mesher's crease angle is NaN or out of range.
+    #[error("a terrain's crease angle must be from 0 to 180 degrees, but `mesher` has {found}")]
+    Crease {
+        /// The rejected angle.
+        found: f32,
     },
     /// There are several levels of detail with the dual mesher.
     #[error("a terrain with the dual mesher must have one level of detail, but `levels.count` is {levels}")]

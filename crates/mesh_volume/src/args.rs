@@ -1,10 +1,11 @@
 //! [`Args`]: the command line.
 
+use std::f32::consts::PI;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use marchless::DualSettings;
+use marchless::{DualSettings, MaterialSet};
 
 use crate::error::Error;
 use crate::output::FORMATS;
@@ -79,6 +80,16 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", requires = "dual", value_parser = steps, default_value_t = 0, allow_hyphen_values = true)]
     pub(crate) smooth: u32,
 
+    /// Keep creases, edges and tips sharp.
+    #[arg(long, requires = "dual")]
+    pub(crate) sharp: bool,
+
+    /// Let normals break where triangles turn by more than this many degrees from one to the next, 0 to 180.
+    ///
+    /// Vertices are copied there, so --check does not go with it. The mesh has the same triangles without it.
+    #[arg(long, value_name = "DEGREES", requires = "sharp", conflicts_with = "check", value_parser = angle, allow_hyphen_values = true)]
+    pub(crate) crease: Option<f32>,
+
     /// Write one mesh per chunk of N cells along each axis (fewer at the far ends), not a single one.
     ///
     /// The files are OUT.0000.ply and so on, numbered by chunk, x fastest. Together they are the whole mesh, in its
@@ -109,7 +120,10 @@ impl Args {
 
     /// The settings of the dual mesher, at an isovalue of the weights; `None` for the primal one.
     pub(crate) fn dual_settings(&self, isovalue: f32) -> Option<DualSettings> {
-        self.dual.then(|| DualSettings { isovalue, smoothing: self.smooth, ..DualSettings::default() })
+        let sharp = if self.sharp { MaterialSet::ALL } else { MaterialSet::EMPTY };
+        let crease = self.crease.map(|degrees| degrees.to_radians().min(PI));
+        let settings = DualSettings { isovalue, smoothing: self.smooth, sharp, crease, ..DualSettings::default() };
+        self.dual.then_some(settings)
     }
 
     /// Checks the names and places of the files, and which options go together, before any work is done.
@@ -178,6 +192,11 @@ fn cells(text: &str) -> Result<NonZeroU32, String> {
 fn steps(text: &str) -> Result<u32, String> {
     let number = text.trim().parse().ok().filter(|number| *number <= 8);
     number.ok_or_else(|| "it must be a whole number of steps from 0 to 8".to_owned())
+}
+
+fn angle(text: &str) -> Result<f32, String> {
+    let number = text.trim().parse().ok().filter(|degrees| (0.0..=180.0).contains(degrees));
+    number.ok_or_else(|| "it must be a number of degrees from 0 to 180".to_owned())
 }
 
 fn shape(text: &str) -> Result<[u32; 3], String> {

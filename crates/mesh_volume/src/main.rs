@@ -18,7 +18,8 @@
 //! `--origin` is the position of the first sample. Positions are `f32`: far from 0, they are rounded.
 //!
 //! With `--dual`, vertices lie in cells instead of on edges. `--smooth` moves each towards the mean of its neighbours,
-//! within its cell: it takes away the steps of a mask.
+//! within its cell: it takes away the steps of a mask. `--sharp` keeps the creases of a field of distances, and `--crease`
+//! breaks the normals there.
 //!
 //! The volume may be larger than memory: it is read, meshed and written a slab (the samples of one z) at a time. Only
 //! `--dual` holds all of it. With

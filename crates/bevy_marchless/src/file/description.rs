@@ -159,7 +159,7 @@ impl TerrainDescription {
             next.levels = self.levels;
         }
         if before.is_none_or(|before| before.mesher != self.mesher) {
-            next.mesher = self.mesher;
+            next.mesher.clone_from(&self.mesher);
         }
         next.check()?;
         *terrain = next;

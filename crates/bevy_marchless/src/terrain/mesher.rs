@@ -1,7 +1,9 @@
 //! [`TerrainMesher`]: how a terrain's samples become triangles.
 
+use core::f32::consts::PI;
+
 use bevy_reflect::prelude::*;
-use marchless::{DualSettings, MeshError, MeshMethod, MeshSettings};
+use marchless::{DualSettings, MaterialSet, MeshError, MeshMethod, MeshSettings};
 
 use super::TerrainError;
 
@@ -12,9 +14,12 @@ use super::TerrainError;
 /// ```
 /// use bevy_marchless::prelude::*;
 ///
-/// let ground = Terrain::new(|[_, y, _]: [f64; 3]| y - 20.0).with_mesher(DualMesher { smoothing: 2 });
+/// // Earth is smooth, masonry of material 3 keeps its edges.
+/// let masonry = SharpMaterials::Only(vec![3]);
+/// let mesher = DualMesher { smoothing: 2, sharp: masonry, crease: Some(30.0) };
+/// let ground = Terrain::new(|[_, y, _]: [f64; 3]| y - 20.0).with_mesher(mesher);
 /// ```
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Debug, PartialEq, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TerrainMesher {
@@ -26,7 +31,7 @@ pub enum TerrainMesher {
 }
 
 /// The settings of the dual mesher.
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Debug, PartialEq, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct DualMesher {
@@ -36,25 +41,59 @@ pub struct DualMesher {
     /// In each step, a vertex moves half the way to the mean of its neighbours, and stays in its cell. Each step makes
     /// meshes read one more layer of samples around their chunks, so edits mesh more chunks again.
     pub smoothing: u32,
+    /// The materials whose creases, edges and tips are kept. Default none.
+    ///
+    /// A vertex has the material of the nearest of the inside samples around it, and is sharp if that material is. Sharp
+    /// vertices are not smoothed.
+    pub sharp: SharpMaterials,
+    /// The angle from which on creases of sharp materials show in the normals: where triangles turn by more than this
+    /// from one to the next, a vertex gets a copy for each side. `None`, the default: nowhere. [Units: degrees]
+    /// [Range: 0 to 180]
+    pub crease: Option<f32>,
+}
+
+/// The materials whose creases the dual mesher keeps.
+#[derive(Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Default, Debug, PartialEq, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum SharpMaterials {
+    /// No material; the default.
+    #[default]
+    None,
+    /// All materials.
+    All,
+    /// These materials.
+    Only(Vec<u8>),
 }
 
 impl TerrainMesher {
     /// The core's method for meshes at an isovalue, with normals. A [`Grid`](marchless::Grid) that is meshed with it gives
     /// the meshes that the plugin draws.
-    pub fn method(self, isovalue: f32) -> MeshMethod {
-        match self {
-            Self::Primal => MeshSettings { isovalue, ..MeshSettings::default() }.into(),
-            Self::Dual(DualMesher { smoothing }) => {
-                DualSettings { isovalue, smoothing, ..DualSettings::default() }.into()
-            }
-        }
+    pub fn method(&self, isovalue: f32) -> MeshMethod {
+        let Self::Dual(DualMesher { smoothing, sharp, crease }) = self else {
+            return MeshSettings { isovalue, ..MeshSettings::default() }.into();
+        };
+        let sharp = match sharp {
+            SharpMaterials::None => MaterialSet::EMPTY,
+            SharpMaterials::All => MaterialSet::ALL,
+            SharpMaterials::Only(materials) => materials.iter().copied().collect(),
+        };
+        // Half a turn in degrees may be a little more than π in `f32`.
+        let radians = |degrees: f32| if degrees == 180.0 { PI } else { degrees.to_radians() };
+        let (smoothing, crease) = (*smoothing, crease.map(radians));
+        DualSettings { isovalue, smoothing, sharp, crease, ..DualSettings::default() }.into()
     }
 
     /// Checks the settings for chunks of this many cells per axis.
     ///
     /// # Errors
-    /// [`TerrainError::Smoothing`].
-    pub(super) fn check(self, chunk_cells: u32) -> Result<(), TerrainError> {
+    /// [`TerrainError::Smoothing`], [`TerrainError::Crease`].
+    pub(super) fn check(&self, chunk_cells: u32) -> Result<(), TerrainError> {
+        if let Self::Dual(DualMesher { crease: Some(crease), .. }) = self
+            && !(0.0..=180.0).contains(crease)
+        {
+            return Err(TerrainError::Crease { found: *crease });
+        }
         match self.method(0.0).check(chunk_cells) {
             Err(MeshError::Smoothing { found, most }) => Err(TerrainError::Smoothing { found, most }),
             _ => Ok(()),

@@ -168,9 +168,14 @@ fn description() -> impl Strategy<Value = TerrainDescription> {
         falloff,
         hysteresis,
     });
-    let smoothing = prop_oneof![Just(0u32), 0..12u32];
-    let mesher =
-        prop_oneof![Just(TerrainMesher::Primal), smoothing.prop_map(|smoothing| DualMesher { smoothing }.into())];
+    let sharp = prop_oneof![
+        Just(SharpMaterials::None),
+        Just(SharpMaterials::All),
+        prop::collection::vec(any::<u8>(), 0..4).prop_map(SharpMaterials::Only),
+    ];
+    let dual = (0..12u32, sharp, prop::option::of(0.0..180.0f32));
+    let dual = dual.prop_map(|(smoothing, sharp, crease)| DualMesher { smoothing, sharp, crease });
+    let mesher = prop_oneof![Just(TerrainMesher::Primal), dual.prop_map(TerrainMesher::from)];
     let all = (source, palette, 1e-3f32..1e3, extent(), keep(), levels, mesher);
     all.prop_map(|(source, palette, voxel_size, extent, keep, levels, mesher)| TerrainDescription {
         source,

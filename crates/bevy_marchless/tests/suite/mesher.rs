@@ -9,11 +9,19 @@ use bevy_marchless::terrain::TerrainError;
 use bevy_math::{DVec3, Dir3, Ray3d, UVec3, Vec3};
 use marchless::MeshBuffer;
 
-const MESHERS: [TerrainMesher; 3] = [
-    TerrainMesher::Primal,
-    TerrainMesher::Dual(DualMesher { smoothing: 0 }),
-    TerrainMesher::Dual(DualMesher { smoothing: 5 }),
-];
+fn meshers() -> [TerrainMesher; 4] {
+    let sharp = SharpMaterials::Only(vec![0, 4]);
+    [
+        TerrainMesher::Primal,
+        DualMesher::default().into(),
+        smoothed(5),
+        DualMesher { smoothing: 2, sharp, crease: Some(20.0) }.into(),
+    ]
+}
+
+fn smoothed(smoothing: u32) -> TerrainMesher {
+    DualMesher { smoothing, ..DualMesher::default() }.into()
+}
 
 /// Waves in chunks of 8 cells, about as high as a border between layers of chunks.
 fn waves() -> Terrain {
@@ -25,12 +33,12 @@ fn dig(terrain: Entity, x: f32, z: f32) -> Stamp {
     Stamp::dig(terrain, BrushShape::sphere(Vec3::new(x, 8.0, z), 2.5))
 }
 
-fn set_mesher(app: &mut App, terrain: Entity, mesher: TerrainMesher) {
-    app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain").mesher = mesher;
+fn set_mesher(app: &mut App, terrain: Entity, mesher: &TerrainMesher) {
+    app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain").mesher = mesher.clone();
 }
 
 /// Asserts that the drawn meshes are those of the newest samples with one mesher, and closed.
-fn assert_mesher(app: &mut App, terrain: Entity, mesher: TerrainMesher) {
+fn assert_mesher(app: &mut App, terrain: Entity, mesher: &TerrainMesher) {
     let drawn = geometry(app, terrain);
     let (grid, mut core) = (volume(app, terrain).grid().clone(), marchless::Mesher::new());
     for position in grid.bounds().expect("bounded").points() {
@@ -44,17 +52,17 @@ fn assert_mesher(app: &mut App, terrain: Entity, mesher: TerrainMesher) {
 
 #[test]
 fn digs_at_borders_show_in_all_chunks_that_read_them() {
-    for mesher in MESHERS {
+    for mesher in meshers() {
         let mut app = app();
-        let terrain = settled(&mut app, waves().with_mesher(mesher));
-        assert_mesher(&mut app, terrain, mesher);
+        let terrain = settled(&mut app, waves().with_mesher(mesher.clone()));
+        assert_mesher(&mut app, terrain, &mesher);
         let mut stamps = Vec::new();
         for (x, z) in [(8.0, 8.0), (20.0, 16.0), (19.5, 27.0), (1.0, 20.0), (5.5, 5.5)] {
             stamps.push(dig(terrain, x, z));
             app.world_mut().write_message(stamps.last().expect("one").clone());
             app.update();
             settle(&mut app, terrain);
-            assert_mesher(&mut app, terrain, mesher);
+            assert_mesher(&mut app, terrain, &mesher);
         }
         assert_as_new(&mut app, terrain, &stamps);
     }
@@ -62,11 +70,12 @@ fn digs_at_borders_show_in_all_chunks_that_read_them() {
 
 #[test]
 fn another_mesher_shows_in_one_update_and_digs_meanwhile_in_theirs() {
-    for (from, to) in [(0, 1), (1, 2), (2, 0), (0, 2)].map(|(from, to)| (MESHERS[from], MESHERS[to])) {
+    let of = |number: usize| meshers()[number].clone();
+    for (from, to) in [(0, 1), (1, 2), (2, 0), (0, 3), (3, 1)].map(|(from, to)| (of(from), of(to))) {
         let mut app = app_with_budget(2);
-        let terrain = settled(&mut app, waves().with_mesher(from));
+        let terrain = settled(&mut app, waves().with_mesher(from.clone()));
         let first = expected_geometry(&app, terrain);
-        set_mesher(&mut app, terrain, to);
+        set_mesher(&mut app, terrain, &to);
         let (mut digs, mut changed) = (0, None);
         for update in 0..600 {
             if update % 5 == 2 && digs < 3 {
@@ -81,7 +90,7 @@ fn another_mesher_shows_in_one_update_and_digs_meanwhile_in_theirs() {
             }
         }
         assert!(changed.is_some() && digs == 3, "{digs} digs before it was shown");
-        assert_mesher(&mut app, terrain, to);
+        assert_mesher(&mut app, terrain, &to);
         assert_drawn(&mut app, terrain);
         assert!(first != expected_geometry(&app, terrain));
     }
@@ -93,7 +102,7 @@ fn the_last_of_many_meshers_and_isovalues_is_shown() {
     let terrain = settled(&mut app, waves());
     for step in 0..30usize {
         let mut settings = app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
-        settings.mesher = MESHERS[step % 3];
+        settings.mesher = meshers()[step % 4].clone();
         settings.isovalue = 0.1 * (step / 4) as f32;
         app.update();
         assert!(report(&mut app, terrain).is_closed(), "step {step}");
@@ -126,9 +135,9 @@ fn nearest(app: &mut App, terrain: Entity, origin: DVec3, direction: DVec3) -> O
 
 #[test]
 fn rays_hit_the_triangles_that_are_drawn() {
-    for mesher in MESHERS {
+    for mesher in meshers() {
         let mut app = app();
-        let terrain = settled(&mut app, waves().with_mesher(mesher));
+        let terrain = settled(&mut app, waves().with_mesher(mesher.clone()));
         app.world_mut().write_message(dig(terrain, 16.0, 16.0));
         app.world_mut().write_message(dig(terrain, 24.0, 13.0));
         app.update();
@@ -160,14 +169,14 @@ fn rays_hit_the_triangles_that_are_drawn() {
 
 #[test]
 fn walls_come_and_go_with_the_extent() {
-    for mesher in MESHERS {
+    for mesher in meshers() {
         let mut app = app();
-        let terrain = settled(&mut app, waves().with_mesher(mesher));
+        let terrain = settled(&mut app, waves().with_mesher(mesher.clone()));
         for extent in [UVec3::new(3, 2, 4), UVec3::new(6, 3, 3), UVec3::new(5, 1, 5)] {
             app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain").extent = extent.into();
             app.update();
             settle(&mut app, terrain);
-            assert_mesher(&mut app, terrain, mesher);
+            assert_mesher(&mut app, terrain, &mesher);
         }
     }
 }
@@ -179,10 +188,10 @@ fn error(app: &App, terrain: Entity) -> Option<TerrainError> {
 #[test]
 fn several_levels_and_too_much_smoothing_are_refused() {
     let mut app = app();
-    let (dual, levels) = (MESHERS[1], TerrainLevels::from(2));
+    let (dual, levels) = (smoothed(0), TerrainLevels::from(2));
     let refused = Some(TerrainError::DualLevels { levels: 2 });
-    let both = app.world_mut().spawn(waves().with_mesher(dual).with_levels(2)).id();
-    let [first_dual, first_levels] = [waves().with_mesher(dual), waves().with_levels(2)].map(|terrain| {
+    let both = app.world_mut().spawn(waves().with_mesher(dual.clone()).with_levels(2)).id();
+    let [first_dual, first_levels] = [waves().with_mesher(dual.clone()), waves().with_levels(2)].map(|terrain| {
         let terrain = app.world_mut().spawn(terrain).id();
         settle(&mut app, terrain);
         terrain
@@ -191,47 +200,57 @@ fn several_levels_and_too_much_smoothing_are_refused() {
     assert!(volume(&app, both).settings().is_none());
 
     app.world_mut().get_mut::<Terrain>(first_dual).expect("a terrain").levels = levels;
-    set_mesher(&mut app, first_levels, dual);
+    set_mesher(&mut app, first_levels, &dual);
     app.update();
     for terrain in [first_dual, first_levels] {
         assert_eq!(error(&app, terrain), refused);
         settle(&mut app, terrain);
     }
-    assert_mesher(&mut app, first_dual, dual);
+    assert_mesher(&mut app, first_dual, &dual);
     assert_eq!(volume(&app, first_levels).settings().expect("the former ones").mesher, TerrainMesher::Primal);
 
     // Each becomes the other, at once.
-    set_mesher(&mut app, first_dual, TerrainMesher::Primal);
+    set_mesher(&mut app, first_dual, &TerrainMesher::Primal);
     app.world_mut().get_mut::<Terrain>(first_levels).expect("a terrain").levels = TerrainLevels::default();
     app.update();
     for terrain in [first_dual, first_levels] {
         assert_eq!(error(&app, terrain), None);
         settle(&mut app, terrain);
     }
-    assert_mesher(&mut app, first_levels, dual);
+    assert_mesher(&mut app, first_levels, &dual);
     let levels = volume(&app, first_dual).leaves().map(|leaf| leaf.level).max();
     assert_eq!(levels, Some(1), "coarser leaves are drawn");
 
-    let smoothing = |smoothing| TerrainMesher::Dual(DualMesher { smoothing });
-    for (mesher, most) in [(smoothing(7), Some(6)), (smoothing(6), None), (smoothing(u32::MAX), Some(6))] {
-        set_mesher(&mut app, first_levels, mesher);
+    let with_creases =
+        |smoothing, degrees| DualMesher { smoothing, crease: Some(degrees), ..DualMesher::default() }.into();
+    for (mesher, expected) in [
+        (smoothed(7), Some(TerrainError::Smoothing { found: 7, most: 6 })),
+        (smoothed(6), None),
+        (smoothed(u32::MAX), Some(TerrainError::Smoothing { found: u32::MAX, most: 8 })),
+        (with_creases(6, 30.0), Some(TerrainError::Smoothing { found: 6, most: 5 })),
+        (with_creases(0, 180.0), None),
+        (with_creases(0, 181.0), Some(TerrainError::Crease { found: 181.0 })),
+        (with_creases(0, -1.0), Some(TerrainError::Crease { found: -1.0 })),
+    ] {
+        set_mesher(&mut app, first_levels, &mesher);
         app.update();
-        let TerrainMesher::Dual(DualMesher { smoothing: found }) = mesher else { unreachable!() };
-        assert_eq!(error(&app, first_levels), most.map(|most| TerrainError::Smoothing { found, most }));
+        assert_eq!(error(&app, first_levels), expected);
     }
+    set_mesher(&mut app, first_levels, &with_creases(0, f32::NAN));
+    app.update();
+    assert!(matches!(error(&app, first_levels), Some(TerrainError::Crease { .. })));
 }
 
 #[test]
 fn fewer_cells_may_come_with_another_mesher() {
     let mut app = app();
-    let smooth = TerrainMesher::Dual(DualMesher { smoothing: 8 });
     let terrain = settled(&mut app, waves());
-    for (cells, mesher) in [(16, smooth), (8, MESHERS[2]), (12, smooth), (8, TerrainMesher::Primal)] {
+    for (cells, mesher) in [(16, smoothed(8)), (8, smoothed(5)), (12, smoothed(8)), (8, TerrainMesher::Primal)] {
         let mut settings = app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
-        (settings.chunk_cells, settings.mesher) = (cells, mesher);
+        (settings.chunk_cells, settings.mesher) = (cells, mesher.clone());
         app.update();
         assert_eq!(error(&app, terrain), None);
         settle(&mut app, terrain);
-        assert_mesher(&mut app, terrain, mesher);
+        assert_mesher(&mut app, terrain, &mesher);
     }
 }

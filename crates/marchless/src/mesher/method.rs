@@ -2,9 +2,6 @@
 
 use super::{DualSettings, MeshError, MeshSettings};
 
-/// The most steps of smoothing in chunks of any size; [`DualSettings`] allows as many.
-const MAX_SMOOTHING: u32 = 8;
-
 /// A mesher and its settings: how the meshes of a [`Grid`](crate::Grid)'s chunks are made.
 ///
 /// Functions that take a method also take the settings of one, [`MeshSettings`] or [`DualSettings`], by value or by
@@ -44,11 +41,11 @@ impl MeshMethod {
     }
 
     /// The layers of samples that the mesh of a chunk reads below its own samples, and those that it reads above, on
-    /// each axis: 1 and 2 with the primal mesher, `2 + smoothing` each with the dual one.
+    /// each axis: 1 and 2 with the primal mesher, [`DualSettings::padding`] each with the dual one.
     pub const fn margins(&self) -> [u32; 2] {
         match self {
             Self::Primal(_) => [1, 2],
-            Self::Dual(settings) => [settings.smoothing.saturating_add(2); 2],
+            Self::Dual(settings) => [settings.padding(); 2],
         }
     }
 
@@ -56,17 +53,20 @@ impl MeshMethod {
     /// around one.
     ///
     /// # Errors
-    /// [`MeshError::Smoothing`] if there are more steps of smoothing than 8 or than `cells − 2`;
-    /// [`MeshError::Isovalue`] if the isovalue is not finite.
+    /// [`MeshError::Smoothing`] if there are more steps of smoothing than 8 or than `cells − 2`, with creases `cells − 3`;
+    /// [`MeshError::Isovalue`] if the isovalue is not finite; [`MeshError::Crease`] if the crease angle is out of range.
     pub fn check(&self, cells: u32) -> Result<(), MeshError> {
-        if let Self::Dual(DualSettings { smoothing, .. }) = *self {
-            let most = cells.saturating_sub(2).min(MAX_SMOOTHING);
-            if smoothing > most {
-                return Err(MeshError::Smoothing { found: smoothing, most });
-            }
+        let settings = match self {
+            Self::Primal(MeshSettings { isovalue, .. }) if isovalue.is_finite() => return Ok(()),
+            Self::Primal(settings) => return Err(MeshError::Isovalue { found: settings.isovalue }),
+            Self::Dual(settings) => settings,
+        };
+        settings.check()?;
+        if settings.padding() > cells {
+            let most = cells.saturating_sub(settings.padding() - settings.smoothing);
+            return Err(MeshError::Smoothing { found: settings.smoothing, most });
         }
-        let isovalue = self.isovalue();
-        if isovalue.is_finite() { Ok(()) } else { Err(MeshError::Isovalue { found: isovalue }) }
+        Ok(())
     }
 }
 
@@ -114,8 +114,8 @@ mod tests {
     #[test]
     fn chunks_are_refused_as_the_mesher_refuses_their_blocks() {
         for cells in 8..=12 {
-            for smoothing in 0..=10 {
-                let method = MeshMethod::from(DualSettings { smoothing, ..DualSettings::default() });
+            for (smoothing, crease) in (0..=10).flat_map(|steps| [None, Some(0.5)].map(|crease| (steps, crease))) {
+                let method = MeshMethod::from(DualSettings { smoothing, crease, ..DualSettings::default() });
                 let [low, high] = method.margins();
                 let shape = Shape::cube(low + cells + high).unwrap();
                 let weights = alloc::vec![1i8; shape.len()];
@@ -127,5 +127,9 @@ mod tests {
         }
         let error = MeshMethod::from(DualSettings { smoothing: 7, ..DualSettings::default() }).check(8);
         assert_eq!(error, Err(MeshError::Smoothing { found: 7, most: 6 }));
+        let with_creases = DualSettings { smoothing: 6, crease: Some(0.5), ..DualSettings::default() };
+        assert_eq!(MeshMethod::from(with_creases).check(8), Err(MeshError::Smoothing { found: 6, most: 5 }));
+        let wide = MeshMethod::from(DualSettings { crease: Some(4.0), ..DualSettings::default() });
+        assert_eq!(wide.check(8), Err(MeshError::Crease { found: 4.0 }));
     }
 }

@@ -1,4 +1,6 @@
-//! `--dual` and `--smooth`: the dual mesher's mesh of the whole volume.
+//! `--dual`, `--smooth`, `--sharp` and `--crease`: the dual mesher's mesh of the whole volume.
+
+use marchless::{DualSettings, MaterialSet};
 
 use crate::program::Folder;
 use crate::readers;
@@ -11,9 +13,17 @@ fn every_type_is_the_dual_mesh_of_the_whole_volume() {
         let folder = Folder::new();
         let volume = Volume::ball([21, 18, 16], kind, 7.0, 4.0);
         folder.write("v.raw", &volume.bytes());
-        for (flags, smoothing) in [("--dual", 0), ("--dual --smooth 3", 3)] {
-            let expected = whole_by(&volume, 100.0, Some(smoothing));
-            assert!(expected.positions.len() > 300 && expected.report().is_clean(), "{}", expected.report());
+        let smooth = |smoothing| DualSettings { smoothing, ..DualSettings::default() };
+        let sharp = |crease| DualSettings { sharp: MaterialSet::ALL, crease, ..smooth(1) };
+        for (flags, settings) in [
+            ("--dual", smooth(0)),
+            ("--dual --smooth 3", smooth(3)),
+            ("--dual --smooth 1 --sharp", sharp(None)),
+            ("--dual --smooth 1 --sharp --crease 20", sharp(Some(20f32.to_radians()))),
+        ] {
+            let expected = whole_by(&volume, 100.0, Some(settings));
+            assert!(expected.positions.len() > 300, "{}", expected.report());
+            assert!(settings.crease.is_some() || expected.report().is_clean(), "{}", expected.report());
             folder.mesh(&format!("v.raw {} --iso 100 {flags} -o o.ply", volume.flags()));
             assert_eq!(readers::ply(&folder.read("o.ply")), expected, "{kind}, {flags}");
         }
@@ -49,6 +59,11 @@ fn flags_that_do_not_go_together_are_refused() {
         ("--smooth 2", "--dual"),
         ("--dual --smooth 9", "0 to 8"),
         ("--dual --smooth=-1", "0 to 8"),
+        ("--sharp", "--dual"),
+        ("--dual --crease 30", "--sharp"),
+        ("--dual --sharp --crease 181", "0 to 180"),
+        ("--dual --sharp --crease NaN", "0 to 180"),
+        ("--dual --sharp --crease 30 --close --check", "--check"),
         ("--dual --exact", "--exact"),
         ("--dual --chunk 4", "--chunk"),
         ("--dual --check", "--close"),

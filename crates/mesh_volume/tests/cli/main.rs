@@ -27,8 +27,8 @@ fn whole(volume: &Volume, iso: f64) -> Mesh {
 }
 
 /// The mesh of the whole volume at once; with steps of smoothing, by the dual mesher.
-fn whole_by(volume: &Volume, iso: f64, dual: Option<u32>) -> Mesh {
-    fn mesh<W: Weight>(volume: &Volume, isovalue: f64, dual: Option<u32>, weight: impl Fn(f64) -> W) -> Mesh {
+fn whole_by(volume: &Volume, iso: f64, dual: Option<DualSettings>) -> Mesh {
+    fn mesh<W: Weight>(volume: &Volume, isovalue: f64, dual: Option<DualSettings>, weight: impl Fn(f64) -> W) -> Mesh {
         let shape = Shape::new(volume.size.map(|n| n as u32)).expect("a small shape");
         let weights: Vec<W> = volume.samples.iter().map(|&sample| weight(sample)).collect();
         let (isovalue, mut out) = (isovalue as f32 / W::SCALE, MeshBuffer::new());
@@ -38,10 +38,7 @@ fn whole_by(volume: &Volume, iso: f64, dual: Option<u32>) -> Mesh {
                 let settings = MeshSettings { isovalue, ..MeshSettings::default() };
                 Mesher::new().mesh(samples, &settings, &mut out)
             }
-            Some(smoothing) => {
-                let settings = DualSettings { isovalue, smoothing, ..DualSettings::default() };
-                Mesher::new().mesh_dual(samples, &settings, &mut out)
-            }
+            Some(settings) => Mesher::new().mesh_dual(samples, &DualSettings { isovalue, ..settings }, &mut out),
         };
         meshed.expect("it can be meshed");
         Mesh { positions: out.positions, normals: out.normals, indices: out.indices }

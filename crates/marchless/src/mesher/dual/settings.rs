@@ -56,7 +56,7 @@ impl DualSettings {
         self.crease.filter(|_| self.normals && !self.sharp.is_empty()).map(cosine)
     }
 
-    pub(super) fn check(&self) -> Result<(), MeshError> {
+    pub(in crate::mesher) fn check(&self) -> Result<(), MeshError> {
         if !self.isovalue.is_finite() {
             return Err(MeshError::Isovalue { found: self.isovalue });
         }
