@@ -7,7 +7,7 @@
 //! environment, they fail, so that the gate does not lapse unnoticed.
 //!
 //! It meshes four fields of 35³ and 64³ `i16` samples, including padding, with normals, on the portable and the AVX2
-//! backend, each forced, in both topologies and with the dual mesher, with means and sharp, into warm buffers. It also runs operations on the bits of 128³ caves, on
+//! backend, each forced, in both topologies, into warm buffers. It also runs operations on the bits of 128³ caves, on
 //! AVX2 only: they choose the fastest backend themselves, and valgrind does not support AVX-512. The fields are sampled
 //! before valgrind starts, since noise takes long under valgrind. Valgrind then runs this program again for each task
 //! and file.
@@ -22,7 +22,7 @@ use std::{
 };
 
 use marchless::{
-    Backend, DualSettings, MaterialSet, MeshBuffer, MeshError, MeshSettings, Mesher, Samples, Shape, Topology, Weight,
+    Backend, MeshBuffer, MeshSettings, Mesher, Samples, Shape, Topology, Weight,
     bits::{BitGrid, BitsError, Connectivity},
 };
 use marchless_benches::Field;
@@ -30,8 +30,8 @@ use marchless_benches::Field;
 const FIELDS: [Field; 4] = [Field::Sphere, Field::Terrain, Field::Caves, Field::WhiteNoise];
 const SIZES: [u32; 2] = [35, 64];
 const BACKENDS: [Backend; 2] = [Backend::Portable, Backend::Avx2];
-/// The ends of the rows' names for each kind of mesh.
-const KINDS: [&str; 4] = ["", " trilinear", " dual", " sharp"];
+/// The ends of the rows' names for each topology.
+const TOPOLOGIES: [&str; 2] = ["", " trilinear"];
 /// The operations on bits.
 const OPERATIONS: [&str; 6] = ["case-masks", "shift", "and", "dilation", "flood", "components"];
 /// The field of the bits and its samples per axis.
@@ -46,8 +46,8 @@ fn main() -> ExitCode {
     let done = match *arguments {
         [] => judge(),
         ["--renew"] => renew(),
-        ["mesh", file, size, backend] => mesh(Path::new(file), size, backend, ""),
-        ["mesh", file, size, backend, kind] => mesh(Path::new(file), size, backend, kind),
+        ["mesh", file, size, backend] => mesh(Path::new(file), size, backend, Topology::Separated),
+        ["mesh", file, size, backend, "trilinear"] => mesh(Path::new(file), size, backend, Topology::Trilinear),
         ["bits", file, size, operation] => operate(Path::new(file), size, operation),
         _ => Err("expected no arguments, or `--renew`".into()),
     };
@@ -116,7 +116,7 @@ fn baseline_path() -> PathBuf {
 #[derive(Debug, PartialEq)]
 struct Counts {
     compiler: String,
-    /// "FIELD SIZE BACKEND KIND", or "FIELD SIZE BACKEND bits OPERATION", and instructions.
+    /// "FIELD SIZE BACKEND TOPOLOGY", or "FIELD SIZE BACKEND bits OPERATION", and instructions.
     of: Vec<(String, u64)>,
 }
 
@@ -152,7 +152,7 @@ impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "# Instructions of meshing once, as callgrind counts them: field, samples per axis, backend, kind of mesh, count."
+            "# Instructions of meshing once, as callgrind counts them: field, samples per axis, backend, topology, count."
         )?;
         writeln!(f, "# And of one operation on bits: field, points per axis, backend, bits, operation, count.")?;
         writeln!(f, "# Written by `{RENEW}` with")?;
@@ -171,9 +171,9 @@ fn measure_in(folder: &Path) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
                     println!("{name} {size} {}: skipped, this machine has no such instructions", backend.name());
                     continue;
                 }
-                for kind in KINDS {
-                    let what = format!("{name} {size} {}{kind}", backend.name());
-                    let rest = format!("{size} {} {kind}", backend.name());
+                for topology in TOPOLOGIES {
+                    let what = format!("{name} {size} {}{topology}", backend.name());
+                    let rest = format!("{size} {} {topology}", backend.name());
                     let count = count("mesh", &file, &rest).map_err(|error| format!("{what}: {error}"))?;
                     counts.push((what, count));
                 }
@@ -227,56 +227,24 @@ fn weights(file: &Path) -> io::Result<Vec<i16>> {
 }
 
 /// The task under callgrind: meshes a file twice; the second time is counted.
-fn mesh(file: &Path, size: &str, backend: &str, kind: &str) -> Result<(), Box<dyn Error>> {
+fn mesh(file: &Path, size: &str, backend: &str, topology: Topology) -> Result<(), Box<dyn Error>> {
     let weights = weights(file)?;
     let samples = Samples::new(Shape::cube(size.parse()?)?, &weights)?.padded();
     let backend = BACKENDS.into_iter().find(|known| known.name() == backend).ok_or("no such backend")?;
     if !backend.is_available() {
         return Err("valgrind hides the instructions of this backend".into());
     }
-    let (mut mesher, mut mesh) = (Mesher::with_backend(backend), MeshBuffer::new());
-    let separated = MeshSettings::default();
-    match kind {
-        "" => mesh_twice(&mut mesher, samples, &mut mesh, &separated, Mesher::mesh)?,
-        "trilinear" => {
-            let trilinear = MeshSettings { topology: Topology::Trilinear, ..separated };
-            mesh_twice(&mut mesher, samples, &mut mesh, &trilinear, Mesher::mesh)?;
-        }
-        "dual" => mesh_twice(&mut mesher, samples, &mut mesh, &DualSettings::default(), Mesher::mesh_dual)?,
-        "sharp" => {
-            let sharp = DualSettings { sharp: MaterialSet::ALL, ..DualSettings::default() };
-            mesh_twice(&mut mesher, samples, &mut mesh, &sharp, Mesher::mesh_dual)?;
-        }
-        _ => return Err("no such kind of mesh".into()),
-    }
+    let (mut mesher, mut mesh, settings) =
+        (Mesher::with_backend(backend), MeshBuffer::new(), MeshSettings { topology, ..MeshSettings::default() });
+    mesher.mesh(samples, &settings, &mut mesh)?;
+    mesh_and_count(&mut mesher, black_box(samples), &settings, &mut mesh);
     if black_box(&mesh).indices.is_empty() { Err("there is no surface".into()) } else { Ok(()) }
-}
-
-/// A method of the mesher.
-type Meshing<T> = fn(&mut Mesher, Samples<'_, i16>, &T, &mut MeshBuffer) -> Result<(), MeshError>;
-
-fn mesh_twice<T>(
-    mesher: &mut Mesher,
-    samples: Samples<'_, i16>,
-    mesh: &mut MeshBuffer,
-    settings: &T,
-    meshing: Meshing<T>,
-) -> Result<(), MeshError> {
-    meshing(mesher, samples, settings, mesh)?;
-    mesh_and_count(mesher, black_box(samples), settings, mesh, meshing);
-    Ok(())
 }
 
 /// Callgrind collects inside of this function alone.
 #[inline(never)]
-fn mesh_and_count<T>(
-    mesher: &mut Mesher,
-    samples: Samples<'_, i16>,
-    settings: &T,
-    mesh: &mut MeshBuffer,
-    meshing: Meshing<T>,
-) {
-    meshing(mesher, samples, settings, mesh).expect("it went well the first time");
+fn mesh_and_count(mesher: &mut Mesher, samples: Samples<'_, i16>, settings: &MeshSettings, mesh: &mut MeshBuffer) {
+    mesher.mesh(samples, settings, mesh).expect("it went well the first time");
 }
 
 /// The task under callgrind: runs an operation on the bits of a file twice; the second time is counted.

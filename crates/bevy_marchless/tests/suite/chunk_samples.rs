@@ -38,7 +38,8 @@ fn samples_by_hand_get_a_mesh_and_another_after_each_change() {
     assert_eq!(heights(&app, entity), vec![4.75; 81]);
 
     // The dual mesher has a vertex in each of the 8 × 8 cells.
-    app.world_mut().get_mut::<ChunkSamples>(entity).unwrap().mesher = DualMesher { smoothing: 3, ..DualMesher::default() }.into();
+    app.world_mut().get_mut::<ChunkSamples>(entity).unwrap().mesher =
+        DualMesher { smoothing: 3, ..DualMesher::default() }.into();
     app.update();
     assert_eq!(heights(&app, entity), vec![4.75; 64]);
 

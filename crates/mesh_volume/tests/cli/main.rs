@@ -26,7 +26,7 @@ fn whole(volume: &Volume, iso: f64) -> Mesh {
     whole_by(volume, iso, None)
 }
 
-/// The mesh of the whole volume at once; with steps of smoothing, by the dual mesher.
+/// The mesh of the whole volume at once; with settings of the dual mesher, by that one.
 fn whole_by(volume: &Volume, iso: f64, dual: Option<DualSettings>) -> Mesh {
     fn mesh<W: Weight>(volume: &Volume, isovalue: f64, dual: Option<DualSettings>, weight: impl Fn(f64) -> W) -> Mesh {
         let shape = Shape::new(volume.size.map(|n| n as u32)).expect("a small shape");
