@@ -98,7 +98,7 @@ fn for_each_slab<S: Sample>(
 /// Either mesher.
 enum VolumeMesher<W> {
     /// The primal mesher, slab by slab.
-    Primal(SlabMesher<W>),
+    Primal(Box<SlabMesher<W>>),
     /// The dual mesher, with the samples of all slabs so far: `slab` samples along x and y.
     Dual { settings: DualSettings, slab: [u32; 2], weights: Vec<W> },
 }
@@ -137,7 +137,7 @@ impl<'a, W: Weight> Meshing<'a, W> {
             None => {
                 let topology = if args.exact { Topology::Trilinear } else { Topology::Separated };
                 let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
-                VolumeMesher::Primal(SlabMesher::new(slab, settings).map_err(|source| error(args, source))?)
+                VolumeMesher::Primal(Box::new(SlabMesher::new(slab, settings).map_err(|source| error(args, source))?))
             }
         };
         let (mesh, progress) = (MeshBuffer::new(), progress_bar(slabs));

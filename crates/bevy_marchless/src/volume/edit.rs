@@ -104,7 +104,7 @@ impl Heart {
         for EditedSet { edit, chunks, affected, places, since } in sets.into_iter().flatten() {
             let before: BTreeMap<_, _> =
                 chunks.iter().filter_map(|chunk| Some((*chunk, before.get(chunk)?.clone()))).collect();
-            let redrawn = self.samples.newest().chunks_with_mesh_changes(&before, edit.region, &settings);
+            let redrawn = self.samples.newest().chunks_with_mesh_changes(&before, edit.region, settings);
             let is_same =
                 |key: &&ChunkKey| key.level == 0 && redrawn.as_ref().is_some_and(|r| !r.contains(&key.position));
             let unchanged_meshes = affected.iter().filter(is_same).copied().collect();

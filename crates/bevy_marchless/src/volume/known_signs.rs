@@ -91,7 +91,7 @@ mod tests {
             let signs = |position: [i32; 3]| grid.chunk(position).map(|chunk| KnownSigns::of(chunk, 0.0));
             let (mut mesher, mut mesh) = (Mesher::new(), MeshBuffer::new());
             for position in Region::new([0; 3], [2; 3]).points() {
-                grid.mesh_chunk(position, &mut mesher, &MeshSettings::default(), &mut mesh).unwrap();
+                grid.mesh_chunk(position, &mut mesher, MeshSettings::default(), &mut mesh).unwrap();
                 let behind = |step: [i32; 3]| signs([0, 1, 2].map(|i| position[i] + step[i]));
                 let without = signs(position).unwrap().are_without_surface(behind);
                 prop_assert!(!without || mesh.is_empty());

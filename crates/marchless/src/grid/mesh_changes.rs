@@ -422,21 +422,21 @@ mod tests {
         let ball = QuantisedShape::sphere([8.0, 6.5, 8.0], 3.0).unwrap();
         let changed = grid.apply(&QuantisedStamp::new(ball, Operation::Dig, 0)).region;
         let affected = grid.chunks_affected_by(changed).points().count();
-        assert_eq!(grid.chunks_with_mesh_changes(&before, changed, &settings), Some(BTreeSet::from([[0; 3]])));
+        assert_eq!(grid.chunks_with_mesh_changes(&before, changed, settings), Some(BTreeSet::from([[0; 3]])));
         assert!(affected > 1, "{affected}");
         assert_eq!(
-            grid.chunks_with_mesh_changes(&chunks(&grid), changed, &settings),
+            grid.chunks_with_mesh_changes(&chunks(&grid), changed, settings),
             Some(BTreeSet::new()),
             "nothing has changed"
         );
         let not_finite = MeshSettings { isovalue: f32::NAN, ..settings };
-        assert_eq!(grid.chunks_with_mesh_changes(&before, changed, &not_finite), None);
-        assert_eq!(grid.chunks_with_mesh_changes(&before, Region::new([0; 3], [61, 1, 1]), &settings), None);
+        assert_eq!(grid.chunks_with_mesh_changes(&before, changed, not_finite), None);
+        assert_eq!(grid.chunks_with_mesh_changes(&before, Region::new([0; 3], [61, 1, 1]), settings), None);
         assert_eq!(
-            grid.chunks_with_mesh_changes(&before, Region::new([0; 3], [0; 3]), &settings),
+            grid.chunks_with_mesh_changes(&before, Region::new([0; 3], [0; 3]), settings),
             Some(BTreeSet::new())
         );
         let ends = Region::new([i32::MIN; 3], [i32::MIN + 1; 3]);
-        assert_eq!(grid.chunks_with_mesh_changes(&before, ends, &settings), None);
+        assert_eq!(grid.chunks_with_mesh_changes(&before, ends, settings), None);
     }
 }

@@ -44,7 +44,7 @@ fn triangles(grid: &Grid<i16>, isovalue: f32) -> Vec<Triangle> {
     let (mut mesher, mut mesh, mut triangles) = (Mesher::new(), MeshBuffer::new(), Vec::new());
     let settings = MeshSettings { isovalue, ..MeshSettings::default() };
     for chunk in grid.bounds().unwrap_or(Region::new([-5; 3], [6; 3])).points() {
-        grid.mesh_chunk(chunk, &mut mesher, &settings, &mut mesh).unwrap();
+        grid.mesh_chunk(chunk, &mut mesher, settings, &mut mesh).unwrap();
         let base = grid.chunk_region(chunk).min;
         triangles.extend(mesh.triangles().map(|indices| Triangle {
             chunk,

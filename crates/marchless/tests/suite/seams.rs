@@ -130,7 +130,7 @@ fn check_seams<W: AnyWeight>(
 ) -> Result<(), TestCaseError> {
     let grid = grid::<W>(field, seed, cells, bounds);
     let settings = MeshSettings { isovalue, topology, ..MeshSettings::default() };
-    let meshes = meshes(&grid, &settings);
+    let meshes = meshes(&grid, settings);
 
     for (&position, mesh) in &meshes {
         // Half of the 26 neighbours: the other half sees this chunk as one of theirs.
@@ -210,7 +210,7 @@ fn a_full_grid_is_a_box_half_a_voxel_inside() {
     for position in bounds.points() {
         grid.insert(position, GridChunk::Uniform(Voxel::new(i16::MIN, 1))).expect("within the bounds");
     }
-    let meshes = meshes(&grid, &MeshSettings::default());
+    let meshes = meshes(&grid, MeshSettings::default());
     let mut ends = [[f64::MAX; 3], [f64::MIN; 3]];
     for (position, mesh) in &meshes {
         let origin = grid.chunk_region(*position).min;

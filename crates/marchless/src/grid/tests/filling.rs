@@ -73,7 +73,7 @@ proptest! {
             for isovalue in [0.0, 1.0, -1.0] {
                 let settings = MeshSettings { isovalue, ..MeshSettings::default() };
                 for (grid, mesh) in grids.iter().zip(&mut meshes) {
-                    grid.mesh_chunk(position, &mut mesher, &settings, mesh).unwrap();
+                    grid.mesh_chunk(position, &mut mesher, settings, mesh).unwrap();
                 }
                 prop_assert_eq!(&meshes[0].positions, &meshes[1].positions);
                 prop_assert_eq!(&meshes[0].normals, &meshes[1].normals);

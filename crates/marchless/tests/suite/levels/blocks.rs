@@ -167,7 +167,7 @@ fn edits_far_from_the_surface_are_closed() {
         for (leaf, _) in cover.leaves().filter(|(_, is_empty)| !is_empty) {
             if leaf.level == 0 {
                 assert!(chunks.contains(leaf.position));
-                grid.mesh_chunk(leaf.position, &mut mesher, &MeshSettings::default(), &mut mesh).expect("it is sound");
+                grid.mesh_chunk(leaf.position, &mut mesher, MeshSettings::default(), &mut mesh).expect("it is sound");
             } else {
                 block.fill(&source, &cover, leaf);
                 let samples = block.samples().expect("a source has one answer for a point");
@@ -208,7 +208,7 @@ fn leaves_of_level_0_are_chunks_of_a_grid() {
     for (leaf, _) in cover.leaves() {
         block.fill(&source, &cover, leaf);
         mesher.mesh_leaf(&block.samples().unwrap(), &MeshSettings::default(), &mut found).unwrap();
-        grid.mesh_chunk(leaf.position, &mut mesher, &MeshSettings::default(), &mut expected).unwrap();
+        grid.mesh_chunk(leaf.position, &mut mesher, MeshSettings::default(), &mut expected).unwrap();
         assert_eq!(found, expected, "{leaf:?}");
         drawn += usize::from(!found.is_empty());
     }
