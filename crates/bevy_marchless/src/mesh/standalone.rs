@@ -175,10 +175,11 @@ impl ChunkSamples {
                 .and_then(|samples| samples.with_materials(materials))
                 .expect("the lengths have been checked");
             mesh_with(ChunkKey::finest([0; 3]), style.as_ref(), None, |scratch, out| {
-                Ok(match &method {
+                match &method {
                     MeshMethod::Primal(settings) => scratch.mesher.mesh(samples, settings, out)?,
                     MeshMethod::Dual(settings) => scratch.mesher.mesh_dual(samples, settings, out)?,
-                })
+                }
+                Ok(())
             })
         }
     }

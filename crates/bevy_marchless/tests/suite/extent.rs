@@ -88,7 +88,7 @@ fn viewers_and_what_is_kept_follow_the_extent() {
             let mut expected = marchless::MeshBuffer::new();
             let grid = volume(&app, terrain).grid();
             let settings = marchless::MeshSettings::default();
-            grid.mesh_chunk(position.to_array(), &mut marchless::Mesher::new(), &settings, &mut expected).unwrap();
+            grid.mesh_chunk(position.to_array(), &mut marchless::Mesher::new(), settings, &mut expected).unwrap();
             assert_eq!(*mesh, expected, "{extent:?}, {position}");
         }
     }

@@ -59,7 +59,7 @@ fn digs_at_borders_show_in_all_chunks_that_read_them() {
         let mut stamps = Vec::new();
         for (x, z) in [(8.0, 8.0), (20.0, 16.0), (19.5, 27.0), (1.0, 20.0), (5.5, 5.5)] {
             stamps.push(dig(terrain, x, z));
-            app.world_mut().write_message(stamps.last().expect("one").clone());
+            app.world_mut().write_message(*stamps.last().expect("one"));
             app.update();
             settle(&mut app, terrain);
             assert_mesher(&mut app, terrain, &mesher);

@@ -40,7 +40,7 @@ fn surface(app: &App, terrain: Entity, isovalue: f32) -> Vec<(IVec3, MeshBuffer)
     let mut mesher = marchless::Mesher::new();
     let mesh = |position| {
         let mut mesh = MeshBuffer::new();
-        grid.mesh_chunk(position, &mut mesher, &settings, &mut mesh).expect("samples of a chunk");
+        grid.mesh_chunk(position, &mut mesher, settings, &mut mesh).expect("samples of a chunk");
         (IVec3::from(position), mesh)
     };
     grid.bounds().expect("bounded").points().map(mesh).filter(|(_, mesh)| !mesh.is_empty()).collect()

@@ -34,7 +34,7 @@ fn wrong(app: &mut App, terrain: Entity, around: IVec3, reach: i32) -> Vec<IVec3
             continue;
         }
         let mut mesh = marchless::MeshBuffer::new();
-        volume.grid().mesh_chunk(position, &mut mesher, &mesh_settings, &mut mesh).unwrap();
+        volume.grid().mesh_chunk(position, &mut mesher, mesh_settings, &mut mesh).unwrap();
         let found = drawn.iter().find(|(at, _)| at.to_array() == position);
         if *found.map(|(_, m)| m.clone()).unwrap_or_default() != mesh {
             wrong.push(IVec3::from(position));
