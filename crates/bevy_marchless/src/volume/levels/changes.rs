@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use marchless::LeafKey;
+
 use super::{LevelJobs, LevelMesh, MAX_RUNNING, Meshing, Running, finest, members};
 use crate::chunk::ChunkKey;
 use crate::jobs::{Ticket, new_number};
@@ -134,11 +136,18 @@ impl Heart {
         Some((*id, stale.iter().map(|key| (*key, self.input(*key, cover))).collect()))
     }
 
-    /// Whether no edit of a change's leaves is being meshed.
+    /// Whether no edit that reaches a change's leaves is being meshed.
     fn is_free(&self, running: &Running) -> bool {
-        let replaced = running.change.removed.iter().chain(&running.change.remeshed);
-        let mut replaced = replaced.map(|leaf| ChunkKey::from(*leaf));
-        replaced.all(|key| !self.groups.is_claimed(key) && !self.groups.is_pending(key))
+        let change = &running.change;
+        let is_free = |leaf: LeafKey| !self.groups.is_claimed(leaf.into()) && !self.groups.is_pending(leaf.into());
+        // An edit that reaches a new leaf reaches those that it replaces; where there were none, those beside it.
+        let is_beside_free = |leaf: LeafKey| {
+            let replaces = |other: &LeafKey| !other.region().intersection(&leaf.region()).is_empty();
+            let near = || self.levels.iter().flat_map(|levels| levels.shown.leaves_near(leaf.region()));
+            change.removed.iter().any(replaces) || near().all(|(near, _)| is_free(near))
+        };
+        change.removed.iter().chain(&change.remeshed).all(|leaf| is_free(*leaf))
+            && change.added.iter().all(|(leaf, is_empty)| *is_empty || is_beside_free(*leaf))
     }
 
     /// Shows a change, with meshes that were made at once.
