@@ -206,7 +206,7 @@ proptest! {
 fn edits_make_place_without_meshes() {
     let detail = LevelDetail { levels: 3, falloff: 2.0, hysteresis: 0.0 };
     let mut game = Game::with_levels(detail);
-    game.heart = Heart::new(game.settings.clone(), 0.0, true, colors(), false);
+    game.heart = Heart::new(game.settings.clone(), game.method(), true, colors(), false);
     game.heart.set_levels(Some(detail));
     game.keep();
     game.happen(&Event::View { viewer: 0, view: Some(([0.5, 2.5, 0.5], 1.0, 0.0, None)) });
