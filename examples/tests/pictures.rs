@@ -62,6 +62,25 @@ fn quickstart_shows_hills() {
 }
 
 #[test]
+fn sharp_terrain_shows_a_hut_on_earth_three_times() {
+    let path = picture_path("sharp_terrain");
+    let Some(_) = render(example("sharp_terrain").arg("--screenshot").arg(&path)) else { return };
+    let picture = Picture::read(&path);
+    let third = picture.width / 3;
+    for view in 0..3 {
+        let (mut stone, mut earth) = (0, 0);
+        for row in picture.pixels.chunks(picture.width) {
+            for [red, green, blue] in &row[view * third..(view + 1) * third] {
+                let is_grey = red.max(green).max(blue) - red.min(green).min(blue) < 16;
+                stone += usize::from(is_grey);
+                earth += usize::from(!is_grey && green > red && green > blue);
+            }
+        }
+        assert!(stone > 2_000 && earth > 8_000, "view {view}: {stone} pixels of stone, {earth} of earth");
+    }
+}
+
+#[test]
 fn ten_million_voxels_away_everything_looks_the_same() {
     let picture = |name: &str, voxels: &str| {
         let path = picture_path(name);

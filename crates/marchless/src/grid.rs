@@ -90,7 +90,7 @@ impl<W: Weight> Grid<W> {
     ///
     /// This marks no chunk dirty. The meshes that change are those of chunks at the old border, at the new border, and
     /// of chunks that were beyond the old bounds. With the dual mesher and more than `chunk_cells − 7` steps of
-    /// smoothing, those of the next layer of chunks inside may change too.
+    /// smoothing (`chunk_cells − 8` with creases), those of the next layer of chunks inside may change too.
     ///
     /// # Errors
     /// [`GridError::Bounds`] if `bounds` is empty or its lattice points do not fit in `i32`; the grid is then

@@ -1,6 +1,6 @@
 //! Terrains with several levels of detail: closed in every update, and edits and rays at every level.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,6 +12,7 @@ use bevy_marchless::stats::TerrainStats;
 use bevy_marchless::stream::LeafState;
 use bevy_marchless::terrain::TerrainError;
 use bevy_math::{DVec3, Dir3, IVec3, Ray3d, Vec3};
+use bevy_platform::collections::HashSet;
 use bevy_transform::components::Transform;
 use fastrand::Rng;
 use marchless::MeshBuffer;
@@ -41,7 +42,7 @@ fn meshes(app: &mut App) -> BTreeMap<(u8, [i32; 3]), Arc<MeshBuffer>> {
 
 /// Checks that all meshes form one closed surface, bit for bit, and that none is drawn where another is.
 fn check_closed(app: &mut App, terrain: Entity) {
-    let mut edges = HashSet::<[[i64; 3]; 2]>::new();
+    let mut edges = HashSet::<[[i64; 3]; 2]>::default();
     for ((level, position), mesh) in meshes(app) {
         let leaf = volume(app, terrain).leaf_at(IVec3::from(position) * (1 << level)).expect("it is in the cover");
         assert_eq!((leaf.level, leaf.position), (level, position.into()), "each place is drawn once");
@@ -158,12 +159,13 @@ fn the_surface_is_closed_without_threads() {
     fly(app_with_budget(24), 240, 2);
 }
 
-/// Run it with `cargo test --release -p bevy_marchless --test suite levels -- --ignored`.
+/// Run it with `cargo test --release -p bevy_marchless --test suite levels -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes an hour"]
 fn long_flights_are_closed() {
     for seed in 0..50 {
         fly(app(), 2_000, seed);
+        println!("flight {seed} is closed");
     }
 }
 
@@ -179,7 +181,7 @@ fn edits_show_at_every_level_in_the_same_update() {
         app.update();
     }
     settle(&mut app, ground);
-    let mut levels = HashSet::new();
+    let mut levels = HashSet::<u8>::default();
     check_closed(&mut app, ground);
     for step in 0..12 {
         let along = f64::from(-114 + 20 * step);

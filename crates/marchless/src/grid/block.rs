@@ -117,7 +117,7 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         self.gather([1, 2], isovalue, out);
     }
 
-    /// Gathers the samples that the chunk's dual mesh is made from: the chunk's own, and `2 + smoothing` layers around
+    /// Gathers the samples that the chunk's dual mesh is made from: the chunk's own, and [`DualSettings::padding`] layers around
     /// them. Otherwise as [`block`](Self::block).
     ///
     /// # Errors
@@ -219,7 +219,7 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
 }
 
 /// The samples of one chunk and of the padding around it: `n + 3` per axis for the primal mesher, and
-/// `n + 4 + 2·smoothing` for the dual one. The caller keeps and reuses a block.
+/// `n + 2·padding` for the dual one ([`DualSettings::padding`]). The caller keeps and reuses a block.
 #[derive(Clone, Debug)]
 pub struct Block<W = i16> {
     shape: Shape,

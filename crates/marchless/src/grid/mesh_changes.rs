@@ -287,7 +287,7 @@ mod tests {
 
     use super::*;
     use crate::brush::{Operation, QuantisedShape, QuantisedStamp};
-    use crate::{DualSettings, MeshBuffer, MeshSettings, Mesher, Voxel};
+    use crate::{DualSettings, MaterialSet, MeshBuffer, MeshSettings, Mesher, Voxel};
 
     const CELLS: u32 = 8;
     const CHUNKS: Region = Region::new([-1; 3], [2; 3]);
@@ -335,26 +335,27 @@ mod tests {
         fn chunks_without_mesh_changes_have_equal_meshes(
             seed in any::<u32>(),
             [bounded, is_noise, exact] in any::<[bool; 3]>(),
-            smoothing in prop::option::of(0..=6u32),
+            (smoothing, sharp, crease) in (prop::option::of(0..=5u32), any::<bool>(), prop::option::of(Just(0.6f32))),
             isovalue in prop_oneof![Just(0.0f32), -2.0..2.0f32],
             stamps in prop::collection::vec(stamp(), 1..3),
         ) {
             let before = ground(seed, bounded, is_noise);
             let mut after = before.clone();
-            if let Some(smoothing) = smoothing {
-                after.set_mesh_method(DualSettings { smoothing, ..DualSettings::default() }).unwrap();
-            }
+            let topology = if exact { Topology::Trilinear } else { Topology::Separated };
+            let sharp = if sharp { MaterialSet::ALL } else { [3].into_iter().collect() };
+            let method = match smoothing {
+                None => MeshMethod::Primal(MeshSettings { isovalue, topology, ..MeshSettings::default() }),
+                Some(smoothing) => {
+                    MeshMethod::Dual(DualSettings { isovalue, smoothing, sharp, crease, ..DualSettings::default() })
+                }
+            };
+            after.set_mesh_method(method).unwrap();
             let changed = stamps.iter().fold(Region::new([0; 3], [0; 3]), |all, stamp| all.union(&after.apply(stamp).region));
             let affected = after.chunks_affected_by(changed);
             let mut old = chunks(&before);
             for position in affected.points() {
                 old.entry(position).or_insert(GridChunk::AIR);
             }
-            let topology = if exact { Topology::Trilinear } else { Topology::Separated };
-            let method = match smoothing {
-                None => MeshMethod::Primal(MeshSettings { isovalue, topology, ..MeshSettings::default() }),
-                Some(smoothing) => MeshMethod::Dual(DualSettings { isovalue, smoothing, ..DualSettings::default() }),
-            };
             let changed_meshes = after.chunks_with_mesh_changes(&old, changed, method);
             prop_assert!(changed_meshes.is_some());
             for position in affected.points() {

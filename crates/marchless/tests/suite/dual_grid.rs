@@ -69,7 +69,7 @@ proptest! {
     fn edits_change_no_chunk_that_is_not_dirty(
         seed: u64,
         cells in 8u32..=16,
-        smoothing in 0..=6u32,
+        (smoothing, crease) in prop_oneof![(0..=6u32, Just(None)), (0..=5u32, Just(Some(0.4f32)))],
         bounded: bool,
         stamps in prop::collection::vec((prop::array::uniform3(-6.0..30.0f64), 0.6..4.0f64, any::<bool>()), 1..4),
     ) {
@@ -78,11 +78,13 @@ proptest! {
         if !bounded {
             grid.set_bounds(None).expect("no bounds");
         }
-        grid.set_mesh_method(dual(smoothing)).expect("few steps");
+        let sharp = [0, 3].into_iter().collect();
+        let method = DualSettings { smoothing, sharp, crease, ..DualSettings::default() };
+        grid.set_mesh_method(method).expect("few steps");
         grid.take_dirty();
         let mesh = |grid: &Grid, position| {
             let mut mesh = marchless::MeshBuffer::new();
-            grid.mesh_chunk(position, &mut marchless::Mesher::new(), dual(smoothing), &mut mesh).expect("a chunk");
+            grid.mesh_chunk(position, &mut marchless::Mesher::new(), method, &mut mesh).expect("a chunk");
             mesh
         };
         let all = chunks.grown(1, 1);
