@@ -23,7 +23,8 @@ fn every_type_is_the_dual_mesh_of_the_whole_volume() {
         ] {
             let expected = whole_by(&volume, 100.0, Some(settings));
             assert!(expected.positions.len() > 300, "{}", expected.report());
-            assert!(settings.crease.is_some() || expected.report().is_clean(), "{}", expected.report());
+            // Sharp triangles may cross each other.
+            assert!(!settings.sharp.is_empty() || expected.report().is_clean(), "{}", expected.report());
             folder.mesh(&format!("v.raw {} --iso 100 {flags} -o o.ply", volume.flags()));
             assert_eq!(readers::ply(&folder.read("o.ply")), expected, "{kind}, {flags}");
         }
