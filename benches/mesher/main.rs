@@ -10,8 +10,8 @@
 //! - For fields without a surface, reading all samples once (xor) is close to the lower bound for any mesher.
 //!
 //! On terrain, caves and white noise up to 128³, ours is also timed with `Topology::Trilinear`, right after the
-//! default, and so is the dual mesher, with means and with all vertices sharp. On terrain and caves of any size, `MeshReport` checks the mesh, with one thread
-//! per processor. Up to 128³, these alone take about a minute:
+//! default, and so is the dual mesher, with means and with all vertices sharp. On terrain and caves of any size,
+//! `MeshReport` checks the mesh, with one thread per processor. Up to 128³, these alone take about a minute:
 //!
 //! `-- '(terrain|caves|white noise) (35|64|128)³/(marchless (i16|f32)(, Trilinear|, dual|, sharp)?$|MeshReport)'`
 //!

@@ -117,8 +117,8 @@ impl<'a, W: Weight> NeighbourhoodView<'a, W> {
         self.gather([1, 2], isovalue, out);
     }
 
-    /// Gathers the samples that the chunk's dual mesh is made from: the chunk's own, and [`DualSettings::padding`] layers around
-    /// them. Otherwise as [`block`](Self::block).
+    /// Gathers the samples that the chunk's dual mesh is made from: the chunk's own, and [`DualSettings::padding`] layers
+    /// around them. Otherwise as [`block`](Self::block).
     ///
     /// # Errors
     /// As [`MeshMethod::check`]; `out` is then unchanged.

@@ -126,11 +126,11 @@ impl Mesher {
     /// `out` is then empty.
     ///
     /// If the samples are [padded](Samples::padded), the outermost [`padding`](DualSettings::padding) layers on each
-    /// side are padding: `2 + smoothing`, and one more with creases. The mesh has the quads of all edges that begin at one of the other samples, and positions count from the first of
-    /// these. So each edge belongs to one block, and the meshes of blocks whose samples continue each other fit:
-    /// together they are one surface, and vertices that several of them have are equal bit for bit, with normals and
-    /// materials. A block has at least as many samples per axis that are not padding as it has layers of padding, or one
-    /// without smoothing.
+    /// side are padding: `2 + smoothing`, and one more with creases. The mesh has the quads of all edges that begin at one
+    /// of the other samples, and positions count from the first of these. So each edge belongs to one block, and the
+    /// meshes of blocks whose samples continue each other fit: together they are one surface, and vertices that several
+    /// of them have are equal bit for bit, with normals and materials. A block has at least as many samples per axis that
+    /// are not padding as it has layers of padding, or one without smoothing.
     ///
     /// Without padding, edges with fewer than four cells have no quad. The surface then ends up to one cell before the
     /// border.
@@ -184,7 +184,8 @@ impl Mesher {
     ///
     /// # Errors
     /// [`MeshError`] if there is no cell to mesh, the isovalue is not finite, there are more steps of smoothing than 8 or
-    /// than the block allows, the crease angle is not one from 0 to π, or `u32` indices cannot number all vertices. `out` is then empty.
+    /// than the block allows, the crease angle is not one from 0 to π, or `u32` indices cannot number all vertices. `out`
+    /// is then empty.
     pub fn mesh_dual<W: Weight>(
         &mut self,
         samples: Samples<'_, W>,
@@ -205,10 +206,9 @@ impl Mesher {
             && smoothing > 0
             && smallest - 2 * padding < padding
         {
-            return Err(MeshError::Smoothing {
-                found: smoothing,
-                most: most_smoothing(smallest, settings.crease.is_some()),
-            });
+            // With `k` layers of padding, `smallest − 2·k` samples are the block's own; their neighbours need as many.
+            let most = (smallest / 3).saturating_sub(padding - smoothing);
+            return Err(MeshError::Smoothing { found: smoothing, most });
         }
         // The mesher itself knows no padding: it reads all samples.
         let whole = Samples::new(shape, samples.weights()).and_then(|whole| match samples.materials() {
@@ -226,10 +226,4 @@ impl Mesher {
         }
         meshed
     }
-}
-
-/// The most steps of smoothing for a padded block of this many samples per axis.
-fn most_smoothing(size: u32, has_creases: bool) -> u32 {
-    // With `k` layers of padding, `size − 2·k` samples are the block's own; those of its neighbours suffice for as many.
-    (size / 3).saturating_sub(if has_creases { 3 } else { 2 })
 }

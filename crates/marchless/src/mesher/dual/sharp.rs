@@ -3,8 +3,7 @@
 //! The plane at a crossing needs the slope of the samples on the crossing's own side of a crease. Central differences
 //! mix both sides; so do differences within the cell, if the crease runs through it. Hence each corner has the slopes
 //! of the side on which the samples go straight on ([`slope`]), and a crossing has those of the end of its edge without
-//! a crease. Of the 2,418 vertices of a turned cube, these lie more than 0.05 cells off: 72 with the cube's own normals,
-//! 116 with these slopes, 282 with central differences, 274 with differences within cells, and 279 of the means.
+//! a crease. The bench `quality` tells how far off vertices lie.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -235,23 +234,12 @@ impl PlanesJob<'_> {
             self.planes.quadrics.first_chunk_mut().expect("a quadric has ten parts");
         let side = |k: usize| if low >> k & 1 == 1 { 0.5 } else { -0.5 };
         for i in 0..len {
-            let across = |k: usize| {
-                let (at_low, at_high) = (slopes[8 * k + low][i], slopes[8 * k + high][i]);
-                let (low_straight, high_straight) = (slopes[24 + 8 * k + low][i], slopes[24 + 8 * k + high][i]);
-                // The end without a crease, if there is one such end.
-                if low_straight > high_straight {
-                    at_low
-                } else if high_straight > low_straight {
-                    at_high
-                } else {
-                    interpolated(at_low, at_high, fractions[i])
-                }
-            };
+            let ends = |part: usize| [slopes[8 * part + low][i], slopes[8 * part + high][i]];
             let inner = ends_high[i] - ends_low[i];
             let gradient = [
-                if axis == 0 { inner } else { across(0) },
-                if axis == 1 { inner } else { across(1) },
-                if axis == 2 { inner } else { across(2) },
+                if axis == 0 { inner } else { slope_between(ends(0), ends(3), fractions[i]) },
+                if axis == 1 { inner } else { slope_between(ends(1), ends(4), fractions[i]) },
+                if axis == 2 { inner } else { slope_between(ends(2), ends(5), fractions[i]) },
             ];
             let squared = dot(gradient, gradient);
             // A gradient that `f32` cannot compute well says nothing.
@@ -317,6 +305,15 @@ fn slope([before, inner, after]: [f32; 3], is_high: bool, size: f32) -> (f32, f3
     let goes_on = (far - inner).abs() < bend * 0.125;
     let one_sided = if goes_on { inner } else { outer };
     if is_straight { ((outer + inner) * 0.5, 1.0) } else { (one_sided, 0.0) }
+}
+
+/// The slope at a crossing across its edge, from those at the ends of the edge: that of the end without a crease, if there
+/// is one such end. `straight`: 1 at ends without one.
+#[inline(always)]
+fn slope_between([low, high]: [f32; 2], straight: [f32; 2], fraction: f32) -> f32 {
+    let between = interpolated(low, high, fraction);
+    let between = if straight[0] > straight[1] { low } else { between };
+    if straight[1] > straight[0] { high } else { between }
 }
 
 #[inline(always)]

@@ -15,7 +15,8 @@ impl Smoothing {
 }
 
 /// Moves each vertex half the way to the mean of its neighbours, in each of `steps` steps. It stays in its cell; halves
-/// are rounded up. Sharp vertices stay where they are. Neighbours are the vertices at the other ends of sides of quads. A side of two quads counts twice.
+/// are rounded up. Sharp vertices stay where they are. Neighbours are the vertices at the other ends of sides of quads. A
+/// side of two quads counts twice.
 pub(super) fn smooth(steps: u32, quads: &[Quad], offsets: &mut [Offset], Smoothing(sums): &mut Smoothing) {
     for _ in 0..steps {
         sums.clear();
