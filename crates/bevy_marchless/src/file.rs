@@ -48,8 +48,9 @@
 //! The names are those of the settings' fields and variants, so the settings' documentation is also the format's.
 //! Fields that are left out have their defaults; unknown fields are an error. `Some` may be left out, and so may the
 //! inner parentheses of a variant with settings: `NoiseHeights(amplitude: 80.0)`, `mesher: Dual(smoothing: 2)`. An
-//! [`Extent`](crate::terrain::Extent) gives the first chunk and one past the last for each axis along which it ends: `(y: (-2, 6))`. Numbers may be `inf`
-//! and `-inf` where the settings allow it. [`TerrainDescription::to_ron`] writes this format.
+//! [`Extent`](crate::terrain::Extent) gives the first chunk and one past the last for each axis along which it ends:
+//! `(y: (-2, 6))`. Numbers may be `inf` and `-inf` where the settings allow it. [`TerrainDescription::to_ron`] writes
+//! this format.
 
 mod description;
 mod error;

@@ -168,20 +168,28 @@ fn check_seams<W: AnyWeight>(
     Ok(())
 }
 
+pub(crate) fn any_field() -> impl Strategy<Value = Field> {
+    prop_oneof![Just(Field::Noise), Just(Field::Steps), Just(Field::Smooth), Just(Field::Uniform)]
+}
+
+/// The bounds of a few chunks.
+pub(crate) fn any_bounds() -> impl Strategy<Value = Region> {
+    let (min, size) = ([-3..3i32, -3..3, -3..3], [1..=3i32, 1..=3, 1..=2]);
+    (min, size).prop_map(|(min, size)| Region::new(min, core::array::from_fn(|axis| min[axis] + size[axis])))
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
     #[test]
     fn borders_are_equal_and_the_union_is_closed(
-        field in prop_oneof![Just(Field::Noise), Just(Field::Steps), Just(Field::Smooth), Just(Field::Uniform)],
+        field in any_field(),
         seed: u64,
         cells in 8u32..=13,
-        min in [-3..3i32, -3..3, -3..3],
-        size in [1..=3i32, 1..=3, 1..=2],
+        bounds in any_bounds(),
         isovalue in prop_oneof![3 => Just(0.0f32), 1 => -3.0..3.0f32],
         topology in prop_oneof![Just(Topology::Separated), Just(Topology::Trilinear)],
     ) {
-        let bounds = Region::new(min, core::array::from_fn(|axis| min[axis] + size[axis]));
         check_seams::<i8>(field, seed, cells, bounds, isovalue, topology)?;
         check_seams::<i16>(field, seed, cells, bounds, isovalue, topology)?;
         check_seams::<f32>(field, seed, cells, bounds, isovalue, topology)?;

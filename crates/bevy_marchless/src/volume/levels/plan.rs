@@ -7,7 +7,9 @@ use std::sync::Arc;
 use bevy_platform::collections::HashMap;
 use marchless::{LeafKey, LevelChange, LevelCover, LevelError, LevelSettings, LevelViewer, Region};
 
-use super::Surfaces;
+use super::{Levels, Surfaces, finest, has_filled};
+use crate::jobs::{Results, Ticket, new_number};
+use crate::volume::Heart;
 
 /// The most changes that are planned at once.
 const MOST: usize = 96;
@@ -179,6 +181,69 @@ impl Plan {
             }
         }
         Some((change, after))
+    }
+}
+
+impl Heart {
+    /// Whether a plan is to be computed.
+    pub(crate) fn has_to_plan(&self) -> bool {
+        // While viewers move, what was planned is still nearly right.
+        let is_due = |levels: &Levels| levels.has_jumped || levels.plan.is_short(levels.is_outdated);
+        self.levels.as_ref().is_some_and(|levels| levels.planning.is_none() && is_due(levels))
+    }
+
+    /// Requests a plan. `start` starts the job, with the queue for its result.
+    pub(crate) fn start_plan(&mut self, start: impl FnOnce(PlanJob, Results<Planned>) -> Ticket) {
+        let Some(levels) = &mut self.levels else { return };
+        if core::mem::take(&mut levels.has_jumped) {
+            let gone = levels.withdraw(|running| running.meshing.is_none());
+            let left: Vec<_> = gone.iter().flat_map(|change| finest(change)).collect();
+            levels.leave_finest(&left, false);
+            self.leaving_around(&left);
+        }
+        let Some(levels) = &mut self.levels else { return };
+        let number = new_number();
+        let job = PlanJob {
+            number,
+            viewers: levels.viewers(),
+            settings: levels.settings,
+            shown: levels.shown.clone(),
+            running: levels.running.iter().map(|(id, running)| (*id, running.change.clone())).collect(),
+            former: levels.target.clone(),
+            surfaces: levels.surfaces.clone(),
+        };
+        levels.since.clear();
+        levels.is_outdated = false;
+        levels.planned_for.clone_from(&levels.viewers);
+        // What was planned so far ends here, so that the new plan begins where it did.
+        levels.plan = Plan::default();
+        levels.planning = Some((number, start(job, levels.planned.clone())));
+    }
+
+    /// Takes in a plan, if one has been computed.
+    pub(crate) fn take_plan(&mut self) {
+        let Some(levels) = &mut self.levels else { return };
+        for planned in levels.planned.take() {
+            if levels.planning.as_ref().is_none_or(|(number, _)| *number != planned.number) {
+                continue;
+            }
+            levels.planning = None;
+            match planned.result {
+                Ok(plan) => {
+                    levels.has_too_many = false;
+                    levels.target.clone_from(&plan.target);
+                    levels.plan = plan;
+                    let Levels { plan, since, surfaces, .. } = levels;
+                    let is_past = |change: &LevelChange| since.iter().any(|made| made.overlaps(change));
+                    plan.withdraw(|change| is_past(change) || has_filled(change, surfaces));
+                }
+                Err(error) => {
+                    if !core::mem::replace(&mut levels.has_too_many, true) {
+                        bevy_log::warn!("the leaves of a terrain stay as they are: {error}");
+                    }
+                }
+            }
+        }
     }
 }
 
