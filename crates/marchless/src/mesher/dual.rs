@@ -106,11 +106,10 @@ impl Extent {
         lacking
     }
 
-    /// Where the edges along `along` with quads begin: the first and the end of their coordinates on `axis`.
+    /// The first coordinate on `axis` at which edges along `along` with quads begin.
     #[inline(always)]
-    const fn edges(&self, along: usize, axis: usize) -> [usize; 2] {
-        let [first, end] = self.cells[axis];
-        [if axis == along && !self.skips_first { first } else { first + 1 }, end]
+    const fn first_edge(&self, along: usize, axis: usize) -> usize {
+        self.cells[axis][0] + if axis == along && !self.skips_first { 0 } else { 1 }
     }
 
     /// Whether edges that begin at a coordinate are part of the mesh.

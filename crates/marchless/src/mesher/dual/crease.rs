@@ -65,7 +65,7 @@ impl Creases {
         self.clear();
         for quad in quads {
             let places = quad.places(offsets);
-            let triangles = quad.any_triangles(offsets, quadrics);
+            let triangles = quad.triangles(offsets, quadrics);
             self.facets.extend(triangles.as_chunks().0.iter().map(|&vertices| Facet::new(quad, vertices, &places)));
         }
         self.gather_corners(offsets);

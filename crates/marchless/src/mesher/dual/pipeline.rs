@@ -4,11 +4,11 @@ use alloc::vec::Vec;
 
 use super::{
     Extent, Offset, STEPS,
-    cells::{CellSearch, CellVertices, VertexList},
+    cells::{CellRows, CellSearch, CellVertices, EdgeList, VertexList},
     crease::Creases,
     place::{BATCH, Batch, CellSlabs},
     quadric::Quadric,
-    quads::{Quad, QuadSearch, write},
+    quads::{Quad, QuadBatch, QuadEdges},
     settings::DualSettings,
     sharp::Planes,
     smooth::{Smoothing, smooth},
@@ -31,7 +31,9 @@ use crate::{
 pub(in crate::mesher) struct DualPipeline {
     signs: SignSweep<4>,
     search: CellSearch,
-    quad_search: QuadSearch,
+    /// The edges with quads that begin on the present slab, by axis.
+    edges: [EdgeList; 3],
+    quad_batch: QuadBatch,
     /// The vertices of the cells below the present slab of cells, and of that slab.
     cells: [CellVertices; 2],
     /// The vertices of the present slab of cells; if vertices are finished together, those of all slabs.
@@ -57,7 +59,8 @@ impl DualPipeline {
         Self {
             signs: SignSweep::new(),
             search: CellSearch::new(),
-            quad_search: QuadSearch::new(),
+            edges: [const { EdgeList::new() }; 3],
+            quad_batch: QuadBatch::new(),
             cells: [CellVertices::new(), CellVertices::new()],
             list: VertexList::new(),
             offsets: Vec::new(),
@@ -166,7 +169,8 @@ impl<'a, W: Weight> DualJob<'a, W> {
         let DualPipeline {
             signs,
             search,
-            quad_search,
+            edges,
+            quad_batch,
             cells,
             list,
             offsets,
@@ -177,8 +181,6 @@ impl<'a, W: Weight> DualJob<'a, W> {
             materials,
             ..
         } = &mut **pipeline;
-        let [low, high] = signs.pair();
-        let signs = signs.all();
         cells.swap(0, 1);
         if is_deferred {
             starts.push((z, list.len));
@@ -187,7 +189,8 @@ impl<'a, W: Weight> DualJob<'a, W> {
         }
         let first = offsets.len();
         let listed = list.len;
-        search.find::<S>(layout, extent, z, signs, first as u32, &mut cells[1], list);
+        let rows = CellRows { layout, extent, z, signs: signs.all() };
+        search.find::<S>(rows, first as u32, &mut cells[1], list, edges);
         if (first + list.len - listed) as u64 > u64::from(u32::MAX) {
             return Err(MeshError::TooManyVertices { found: (first + list.len - listed) as u64 });
         }
@@ -218,24 +221,17 @@ impl<'a, W: Weight> DualJob<'a, W> {
             }
         }
 
-        let [below, cells] = [&cells[0], &cells[1]];
-        let cells = [below, cells];
-        let rows = layout.words;
-        let signs = low.signs();
-        let along_y = [&signs[..signs.len() - rows], &signs[rows..]];
+        let quad_edges = QuadEdges { layout, extent, z, cells };
+        let [x_edges, y_edges, z_edges] = edges;
         if is_deferred {
-            quad_search.find::<S, 0>(layout, extent, z, [signs, low.next()], cells, |quad| quads.push(quad));
-            quad_search.find::<S, 1>(layout, extent, z, along_y, cells, |quad| quads.push(quad));
-            quad_search.find::<S, 2>(layout, extent, z, [signs, high.signs()], cells, |quad| quads.push(quad));
+            quad_edges.list::<0>(x_edges, quads);
+            quad_edges.list::<1>(y_edges, quads);
+            quad_edges.list::<2>(z_edges, quads);
         } else {
             let indices = &mut out.indices;
-            let (x_edges, y_edges, z_edges) = ([signs, low.next()], along_y, [signs, high.signs()]);
-            quad_search
-                .find::<S, 0>(layout, extent, z, x_edges, cells, |quad| write::<0>(&quad, offsets, quadrics, indices));
-            quad_search
-                .find::<S, 1>(layout, extent, z, y_edges, cells, |quad| write::<1>(&quad, offsets, quadrics, indices));
-            quad_search
-                .find::<S, 2>(layout, extent, z, z_edges, cells, |quad| write::<2>(&quad, offsets, quadrics, indices));
+            quad_batch.append::<0>(&quad_edges, x_edges, offsets, quadrics, indices);
+            quad_batch.append::<1>(&quad_edges, y_edges, offsets, quadrics, indices);
+            quad_batch.append::<2>(&quad_edges, z_edges, offsets, quadrics, indices);
         }
         Ok(())
     }
@@ -304,7 +300,7 @@ impl<'a, W: Weight> DualJob<'a, W> {
         } else {
             for quad in quads.iter_mut().filter(|quad| quad.is_own) {
                 quad.vertices = quad.vertices.map(|vertex| numbers[vertex as usize]);
-                self.out.indices.extend_from_slice(&quad.any_triangles(offsets, quadrics));
+                self.out.indices.extend_from_slice(&quad.triangles(offsets, quadrics));
             }
         }
 
