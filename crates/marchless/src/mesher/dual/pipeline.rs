@@ -211,6 +211,7 @@ impl<'a, W: Weight> DualJob<'a, W> {
                 let is_sharp = |i: usize| sharp.contains(own.get(i).copied().unwrap_or_default());
                 if (0..range.len()).any(is_sharp) {
                     let range = range.clone();
+                    batch.copy_samples(planes, range.len().next_multiple_of(16));
                     batch.sharpen(self.backend, &slabs, list, range, planes, is_sharp, quadrics, placed);
                 } else {
                     quadrics.resize(quadrics.len() + range.len(), Quadric::default());

@@ -1,7 +1,7 @@
 //! [`Quadric`]: the squared distances to the planes at a loop's crossings, and where in the cell their sum is least.
 //!
 //! All of it is sums, products, quotients and square roots of `f32` in a fixed order, so it gives the same bits
-//! everywhere. [`Quadric::least`] has no branch, so that a loop over many quadrics runs on vectors.
+//! everywhere. [`turn`] and [`Quadric::least`] have no branch, so that loops over many quadrics run on vectors.
 //!
 //! The least point by eigenvectors, without the directions in which the planes say little, comes from Peter Lindstrom,
 //! "Out-of-Core Simplification of Large Polygonal Models" (2000).
@@ -30,9 +30,10 @@ pub(super) struct Least {
     pub(super) at: [f32; 3],
     /// The number of directions that the planes tell: more than one at a crease or a tip, 0 without planes.
     pub(super) directions: f32,
-    /// Eigenvalues and eigenvectors. The eigenvalues that say nothing are 0.
-    values: [f32; 3],
-    vectors: [[f32; 3]; 3],
+    /// The eigenvalues. Those that say nothing are 0.
+    pub(super) values: [f32; 3],
+    /// The eigenvectors.
+    pub(super) vectors: [[f32; 3]; 3],
 }
 
 impl Quadric {
@@ -51,18 +52,17 @@ impl Quadric {
     }
 
     /// The point nearest to `start` of those where the quadric is least, without negligible eigenvalues. `start` if
-    /// there are no planes.
+    /// there are no planes. `diagonal` and `vectors`: the eigenvalues and eigenvectors of its matrix.
     #[inline(always)]
-    pub(super) fn least(&self, start: [f32; 3]) -> Least {
+    pub(super) fn least(&self, start: [f32; 3], diagonal: [f32; 3], vectors: [[f32; 3]; 3]) -> Least {
         let slope = self.slope(start);
-        let jacobi = Jacobi::of(self.matrix).sweep().sweep().sweep().sweep();
-        let [x, y, z] = jacobi.diagonal;
+        let [x, y, z] = diagonal;
         let largest = larger(larger(x, y), z);
         let limit = largest * NEGLIGIBLE;
         let (mut at, mut values, mut kept) = (start, [0.0; 3], 0.0);
         let mut k = 0;
         while k < 3 {
-            let (value, vector) = (jacobi.diagonal[k], jacobi.vectors[k]);
+            let (value, vector) = (diagonal[k], vectors[k]);
             let is_kept = value > limit;
             let inverse = if is_kept { 1.0 / value } else { 0.0 };
             let step = dot(vector, slope) * inverse;
@@ -71,14 +71,12 @@ impl Quadric {
             kept += if is_kept { 1.0 } else { 0.0 };
             k += 1;
         }
-        Least { at, directions: kept, values, vectors: jacobi.vectors }
+        Least { at, directions: kept, values, vectors }
     }
 
-    /// The point of the cell where the quadric is least, as [`Self::least`], if that lies outside.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn least_in_cell(&self, start: [f32; 3]) -> [f32; 3] {
-        let least = self.least(start);
+    /// The point of the cell where the quadric is least, if the one where it is `least` at all lies outside. `start`: as
+    /// for [`Self::least`].
+    pub(super) fn least_in_cell(&self, start: [f32; 3], least: &Least) -> [f32; 3] {
         let largest = larger(larger(least.values[0], least.values[1]), least.values[2]);
         // A little of the distance from `start` makes the point unique.
         let mut matrix = [[0.0; 3]; 3];
@@ -140,34 +138,29 @@ fn least_in_box(matrix: &[[f32; 3]; 3], slope: [f32; 3], bounds: [[f32; 2]; 3], 
     best
 }
 
-/// A symmetric matrix on its way to a diagonal one, by Jacobi's rotations.
-#[derive(Clone, Copy)]
-struct Jacobi {
-    diagonal: [f32; 3],
-    xy: f32,
-    xz: f32,
-    yz: f32,
-    vectors: [[f32; 3]; 3],
+/// One rotation of Jacobi: makes the element of a symmetric matrix at `P` and `Q` zero, where `P < Q`. `vectors`: the
+/// product of all rotations before. After four sweeps through the three pairs, `f32` would see no more of the elements
+/// beside the diagonal.
+#[inline(always)]
+pub(super) fn turn<const P: usize, const Q: usize>(matrix: &mut [f32; 6], vectors: &mut [[f32; 3]; 3]) {
+    // The third axis, and the elements beside the diagonal.
+    let (r, beside) = (3 - P - Q, |a: usize, b: usize| 2 + a + b);
+    let Turn { cosine, sine, low, high } = Turn::of(matrix[P], matrix[Q], matrix[beside(P, Q)]);
+    let [low_beside, high_beside] = turned(cosine, sine, matrix[beside(P, r)], matrix[beside(Q, r)]);
+    (matrix[P], matrix[Q], matrix[beside(P, Q)]) = (low, high, 0.0);
+    (matrix[beside(P, r)], matrix[beside(Q, r)]) = (without_tiny(low_beside), without_tiny(high_beside));
+    [vectors[P], vectors[Q]] = turned_vectors(cosine, sine, vectors[P], vectors[Q]);
 }
 
-impl Jacobi {
-    #[inline(always)]
-    const fn of([xx, yy, zz, xy, xz, yz]: [f32; 6]) -> Self {
-        Self { diagonal: [xx, yy, zz], xy, xz, yz, vectors: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
-    }
-
-    /// One rotation in each plane. Four sweeps leave nothing that `f32` would see.
-    #[inline(always)]
-    fn sweep(self) -> Self {
-        let Self { diagonal: [x, y, z], xy, xz, yz, vectors: [a, b, c] } = self;
-        let Turn { cosine, sine, low: x, high: y } = Turn::of(x, y, xy);
-        let ([xz, yz], [a, b]) = (turned(cosine, sine, xz, yz), turned_vectors(cosine, sine, a, b));
-        let Turn { cosine, sine, low: x, high: z } = Turn::of(x, z, xz);
-        let ([xy, yz], [a, c]) = (turned(cosine, sine, 0.0, yz), turned_vectors(cosine, sine, a, c));
-        let Turn { cosine, sine, low: y, high: z } = Turn::of(y, z, yz);
-        let ([xy, xz], [b, c]) = (turned(cosine, sine, xy, 0.0), turned_vectors(cosine, sine, b, c));
-        Self { diagonal: [x, y, z], xy, xz, yz: 0.0, vectors: [a, b, c] }
-    }
+/// An element beside the diagonal, or 0 if it is far too small to turn anything: the largest elements are about 1.
+///
+/// Rotations make elements smaller and smaller. Processors take a hundred times as long for products that are below the
+/// normal numbers of `f32`.
+#[inline(always)]
+pub(super) const fn without_tiny(element: f32) -> f32 {
+    /// 2⁻⁵⁸.
+    const TINY: f32 = 1.0 / (1u64 << 58) as f32;
+    if element.abs() < TINY { 0.0 } else { element }
 }
 
 /// A rotation that makes one element beside the diagonal zero, and the two elements on the diagonal afterwards.

@@ -12,7 +12,7 @@ use super::{
     Offset, STEPS, VertexKind,
     cells::VertexList,
     place::{BATCH, Batch, CORNERS, CellSlabs, whole, within_cell},
-    quadric::{Quadric, REACH, dot},
+    quadric::{Least, Quadric, REACH, dot, turn, without_tiny},
 };
 use crate::{
     math::sqrt,
@@ -38,6 +38,9 @@ pub(super) struct Planes {
     at: Vec<Lanes>,
     /// The number of directions that the planes tell; 0 if there are none.
     directions: Vec<Lanes>,
+    /// The parts of each quadric's matrix on its way to a diagonal one, in the order of [`Quadric`]; then the parts of
+    /// the three eigenvectors. At last, the eigenvalues that say nothing are 0.
+    eigen: Vec<Lanes>,
 }
 
 /// The number of a corner's sample among those of a cell.
@@ -53,17 +56,36 @@ const fn outer_sample(corner: usize, axis: usize) -> usize {
 impl Planes {
     /// It allocates nothing until the first sharp vertex.
     pub(super) const fn new() -> Self {
-        Self { samples: Vec::new(), slopes: Vec::new(), quadrics: Vec::new(), at: Vec::new(), directions: Vec::new() }
+        Self {
+            samples: Vec::new(),
+            slopes: Vec::new(),
+            quadrics: Vec::new(),
+            at: Vec::new(),
+            directions: Vec::new(),
+            eigen: Vec::new(),
+        }
     }
 
     fn quadric(&self, i: usize) -> Quadric {
         quadric_of(&self.quadrics, i)
     }
+
+    /// Where the quadric is least.
+    fn least(&self, i: usize) -> Least {
+        let part = |number: usize| self.eigen[number][i];
+        Least {
+            at: [0, 1, 2].map(|axis: usize| self.at[axis][i]),
+            directions: self.directions[0][i],
+            values: [0, 1, 2].map(part),
+            vectors: [6, 9, 12].map(|first| [part(first), part(first + 1), part(first + 2)]),
+        }
+    }
 }
 
 impl<W: Weight> Batch<W> {
     /// Moves the gathered and placed vertices that `is_sharp` chooses by their number to where their planes have it.
-    /// Appends the quadric of each vertex to `quadrics`. `offsets`: the places of the vertices.
+    /// Appends the quadric of each vertex to `quadrics`. `planes`: with the [copied samples](Self::copy_samples).
+    /// `offsets`: the places of the vertices.
     #[inline(never)]
     pub(super) fn sharpen(
         &mut self,
@@ -78,9 +100,7 @@ impl<W: Weight> Batch<W> {
     ) {
         let count = range.len();
         let len = count.next_multiple_of(16);
-        planes.samples.resize(32, [0.0; BATCH]);
         planes.at.resize(3, [0.0; BATCH]);
-        self.copy_samples(&mut planes.samples, len);
         for (at, offsets) in planes.at.iter_mut().zip(&self.offsets) {
             for (at, &steps) in at.iter_mut().zip(&offsets[..len.min(BATCH)]) {
                 *at = steps * (1.0 / STEPS as f32) - 0.5;
@@ -102,7 +122,7 @@ impl<W: Weight> Batch<W> {
             let mut point = [0, 1, 2].map(|axis: usize| planes.at[axis][i]);
             if point.iter().any(|v| v.abs() > REACH) {
                 let mean = [0, 1, 2].map(|axis: usize| self.offsets[axis][i] * (1.0 / STEPS as f32) - 0.5);
-                point = quadric.least_in_cell(mean);
+                point = quadric.least_in_cell(mean, &planes.least(i));
             }
             let steps = point.map(rounded);
             for (of_axis, steps) in self.offsets.iter_mut().zip(steps) {
@@ -114,18 +134,33 @@ impl<W: Weight> Batch<W> {
         }
     }
 
-    fn copy_samples(&self, samples: &mut [Lanes], len: usize) {
-        for corner in 0..8 {
-            let (x, y, z) = (corner & 1, corner >> 1 & 1, corner >> 2);
-            let (left, right) = &self.rows[corner >> 1];
-            let (y_side, z_side) = (&self.y_sides[2 * z + y], &self.z_sides[2 * y + z]);
-            for i in 0..len.min(BATCH) {
-                let row = W::joined(left[i], right[i]);
-                samples[corner_sample(corner)][i] = W::to_f32(row[1 + x].wide());
-                samples[outer_sample(corner, 0)][i] = W::to_f32(row[3 * x].wide());
-                samples[outer_sample(corner, 1)][i] = W::to_f32(W::both(y_side[i])[x].wide());
-                samples[outer_sample(corner, 2)][i] = W::to_f32(W::both(z_side[i])[x].wide());
-            }
+    /// Copies the samples of the gathered vertices, `len` of them, for their planes.
+    #[inline(always)]
+    pub(super) fn copy_samples(&self, planes: &mut Planes, len: usize) {
+        planes.samples.resize(32, [0.0; BATCH]);
+        let samples: &mut [Lanes; 32] = planes.samples.first_chunk_mut().expect("32 samples are around a cell");
+        // Written out, so that all indices are constants.
+        self.copy_corner::<0>(samples, len);
+        self.copy_corner::<1>(samples, len);
+        self.copy_corner::<2>(samples, len);
+        self.copy_corner::<3>(samples, len);
+        self.copy_corner::<4>(samples, len);
+        self.copy_corner::<5>(samples, len);
+        self.copy_corner::<6>(samples, len);
+        self.copy_corner::<7>(samples, len);
+    }
+
+    #[inline(always)]
+    fn copy_corner<const CORNER: usize>(&self, samples: &mut [Lanes; 32], len: usize) {
+        let (x, y, z) = (CORNER & 1, CORNER >> 1 & 1, CORNER >> 2);
+        let (left, right) = &self.rows[CORNER >> 1];
+        let (y_side, z_side) = (&self.y_sides[2 * z + y], &self.z_sides[2 * y + z]);
+        for i in 0..len.min(BATCH) {
+            let row = W::joined(left[i], right[i]);
+            samples[corner_sample(CORNER)][i] = W::to_f32(row[1 + x].wide());
+            samples[outer_sample(CORNER, 0)][i] = W::to_f32(row[3 * x].wide());
+            samples[outer_sample(CORNER, 1)][i] = W::to_f32(W::both(y_side[i])[x].wide());
+            samples[outer_sample(CORNER, 2)][i] = W::to_f32(W::both(z_side[i])[x].wide());
         }
     }
 }
@@ -155,6 +190,7 @@ impl Job for PlanesJob<'_> {
         debug_assert_eq!((planes.samples.len(), planes.at.len()), (32, 3));
         self.planes.slopes.resize(48, [0.0; BATCH]);
         self.planes.directions.resize(1, [0.0; BATCH]);
+        self.planes.eigen.resize(15, [0.0; BATCH]);
         self.planes.quadrics.clear();
         self.planes.quadrics.resize(10, [0.0; BATCH]);
         let mut job = self;
@@ -179,6 +215,12 @@ impl Job for PlanesJob<'_> {
         job.add_planes::<9>();
         job.add_planes::<10>();
         job.add_planes::<11>();
+        job.start_turns();
+        for _ in 0..4 {
+            job.turn::<0, 1>();
+            job.turn::<0, 2>();
+            job.turn::<1, 2>();
+        }
         job.find_least();
     }
 }
@@ -267,20 +309,70 @@ impl PlanesJob<'_> {
         }
     }
 
+    /// Begins the search of the eigenvectors.
+    #[inline(always)]
+    fn start_turns(&mut self) {
+        let len = self.xs.len().min(BATCH);
+        let Planes { eigen, quadrics, .. } = &mut *self.planes;
+        eigen[..3].copy_from_slice(&quadrics[..3]);
+        for (elements, parts) in eigen[3..6].iter_mut().zip(&quadrics[3..6]) {
+            for (element, &part) in elements[..len].iter_mut().zip(parts) {
+                *element = without_tiny(part);
+            }
+        }
+        for (number, lanes) in eigen[6..].iter_mut().enumerate() {
+            lanes.fill(if number % 4 == 0 { 1.0 } else { 0.0 });
+        }
+    }
+
+    /// Applies one rotation to all matrices.
+    ///
+    /// Each rotation is a loop of its own: a rotation waits long for its roots and quotients, and in one loop a vector
+    /// of matrices would wait for twelve rotations before the next one starts.
+    #[inline(always)]
+    fn turn<const P: usize, const Q: usize>(&mut self) {
+        let len = self.xs.len().min(BATCH);
+        let eigen: &mut [Lanes; 15] = self.planes.eigen.first_chunk_mut().expect("15 parts");
+        for i in 0..len {
+            let (mut matrix, mut vectors) = eigen_of(eigen, i);
+            turn::<P, Q>(&mut matrix, &mut vectors);
+            let beside = 2 + P + Q;
+            let (p_beside, q_beside) = (5 - Q, 5 - P);
+            for part in [P, Q, beside, p_beside, q_beside] {
+                eigen[part][i] = matrix[part];
+            }
+            for axis in [P, Q] {
+                eigen[6 + 3 * axis][i] = vectors[axis][0];
+                eigen[7 + 3 * axis][i] = vectors[axis][1];
+                eigen[8 + 3 * axis][i] = vectors[axis][2];
+            }
+        }
+    }
+
     /// Moves all vertices to where their quadrics are least.
     #[inline(always)]
     fn find_least(&mut self) {
         let len = self.xs.len().min(BATCH);
-        let Planes { quadrics, at, directions, .. } = &mut *self.planes;
+        let Planes { quadrics, at, directions, eigen, .. } = &mut *self.planes;
         let quadrics: &[Lanes; 10] = quadrics.first_chunk().expect("a quadric has ten parts");
+        let eigen: &mut [Lanes; 15] = eigen.first_chunk_mut().expect("15 parts");
         let [x, y, z] = at.first_chunk_mut().expect("there are three axes");
         let directions = &mut directions[0];
         for i in 0..len {
-            let least = quadric_of(quadrics, i).least([x[i], y[i], z[i]]);
+            let (matrix, vectors) = eigen_of(eigen, i);
+            let diagonal = [matrix[0], matrix[1], matrix[2]];
+            let least = quadric_of(quadrics, i).least([x[i], y[i], z[i]], diagonal, vectors);
             [x[i], y[i], z[i]] = least.at;
+            [eigen[0][i], eigen[1][i], eigen[2][i]] = least.values;
             directions[i] = least.directions;
         }
     }
+}
+
+#[inline(always)]
+const fn eigen_of(parts: &[Lanes; 15], i: usize) -> ([f32; 6], [[f32; 3]; 3]) {
+    let [xx, yy, zz, xy, xz, yz, a, b, c, d, e, f, g, h, k] = parts;
+    ([xx[i], yy[i], zz[i], xy[i], xz[i], yz[i]], [[a[i], b[i], c[i]], [d[i], e[i], f[i]], [g[i], h[i], k[i]]])
 }
 
 /// The fractions of an edge from samples of any size.
