@@ -314,7 +314,7 @@ fn write_loops(rows: &CellRows<'_>, cell: [u32; 2], own_case: u8, lacking: u16, 
 
 /// The bits of a word that stand for cells from `start` to `end`. `x`: the cell of the lowest bit.
 #[inline(always)]
-pub(super) const fn bits_between(x: usize, [start, end]: [usize; 2]) -> u64 {
+const fn bits_between(x: usize, [start, end]: [usize; 2]) -> u64 {
     let low = start.saturating_sub(x);
     let high = end.saturating_sub(x);
     if low >= 64 || high <= low {

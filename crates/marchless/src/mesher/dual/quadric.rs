@@ -154,8 +154,8 @@ pub(super) fn turn<const P: usize, const Q: usize>(matrix: &mut [f32; 6], vector
 
 /// An element beside the diagonal, or 0 if it is far too small to turn anything: the largest elements are about 1.
 ///
-/// Rotations make elements smaller and smaller. Processors take a hundred times as long for products that are below the
-/// normal numbers of `f32`.
+/// Rotations make elements smaller and smaller, and many processors are slow at products below the normal numbers of
+/// `f32`.
 #[inline(always)]
 pub(super) const fn without_tiny(element: f32) -> f32 {
     /// 2⁻⁵⁸.
